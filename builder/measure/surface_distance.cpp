@@ -1,84 +1,22 @@
 #include "builder/measure/surface_distance.h"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <limits>
 #include <mutex>
 #include <numbers>
-#include <thread>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+
+#include "builder/measure/mesh_samples.h"
 
 namespace vcp {
 
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr uint64_t kBlock = 512;
-
-/// SplitMix64 (Steele, Lea and Flood 2014): a stream of its own for every sample.
-class SampleRandom {
-public:
-    SampleRandom(uint64_t seed, uint64_t sample) : state_(seed * 0x9e3779b97f4a7c15u ^ sample * 0xd1342543de82ef95u) {}
-
-    uint64_t next() {
-        uint64_t z = state_ += 0x9e3779b97f4a7c15u;
-        z = (z ^ z >> 30) * 0xbf58476d1ce4e5b9u;
-        z = (z ^ z >> 27) * 0x94d049bb133111ebu;
-        return z ^ z >> 31;
-    }
-    double unit() { return double(next() >> 11) * 0x1p-53; }
-    uint64_t below(uint64_t count) { return std::min(uint64_t(unit() * double(count)), count - 1); }
-    glm::dvec3 direction() {
-        const double z = 2 * unit() - 1, phi = 2 * std::numbers::pi * unit();
-        const double r = std::sqrt(std::max(1 - z * z, 0.0));
-        return {r * std::cos(phi), r * std::sin(phi), z};
-    }
-
-private:
-    uint64_t state_;
-};
-
-/// Runs `work(sample)` for all samples below `count` in blocks. Returns false when cancelled.
-class BlockRunner {
-public:
-    explicit BlockRunner(const SurfaceDistanceOptions& options)
-        : progress_(options.progress),
-          threads_(options.threads > 0 ? options.threads : std::max(1u, std::thread::hardware_concurrency())) {}
-
-    template <class Work>
-    bool run(uint64_t count, double from, double to, const Work& work) {
-        std::atomic<uint64_t> next{0};
-        std::atomic<bool> cancelled{false};
-        const uint64_t blocks = (count + kBlock - 1) / kBlock;
-        const auto loop = [&] {
-            for (uint64_t block = next++; block < blocks && !cancelled; block = next++) {
-                for (uint64_t i = block * kBlock; i < std::min(count, (block + 1) * kBlock); ++i) work(i);
-                if (!report(from + (to - from) * double(block + 1) / double(blocks))) cancelled = true;
-            }
-        };
-        std::vector<std::thread> threads;
-        for (unsigned t = 1; t < threads_; ++t) threads.emplace_back(loop);
-        loop();
-        for (std::thread& thread : threads) thread.join();
-        return !cancelled;
-    }
-
-private:
-    bool report(double fraction) {
-        if (!progress_) return true;
-        const std::lock_guard lock(mutex_);
-        done_ = std::max(done_, fraction);
-        return progress_(done_);
-    }
-
-    const std::function<bool(double)>& progress_;
-    unsigned threads_;
-    std::mutex mutex_;
-    double done_ = 0;
-};
+constexpr uint64_t kBlock = SampleRunner::kBlock;
 
 /// A convex polygon, of a triangle cut off at the walls of a box: up to 3 + 6 corners.
 struct Polygon {
@@ -195,54 +133,6 @@ private:
     std::vector<bool> inCut_;
 };
 
-/// Samples points of the mesh, by area, on edges and at vertices in the ratio 2 : 1 : 1. Triangles without area are not
-/// part of the surface: scans have hairs of them that stick out.
-class MeshSampler {
-public:
-    explicit MeshSampler(const IndexedMesh& mesh) : mesh_(mesh) {
-        double sum = 0;
-        for (uint64_t t = 0; t < mesh.triangles.size(); ++t) {
-            const auto v = mesh.corners(t);
-            const double area = glm::length(glm::cross(v[1] - v[0], v[2] - v[0]));
-            if (!(area > 0)) continue;
-            triangles_.push_back(uint32_t(t));
-            areaUpTo_.push_back(sum += area);
-        }
-    }
-
-    [[nodiscard]] bool empty() const { return triangles_.empty(); }
-
-    struct Sample {
-        glm::dvec3 position, normal;
-    };
-
-    Sample sample(uint64_t number, SampleRandom& random) const {
-        const uint64_t kind = number & 3;
-        const uint64_t triangle = kind < 2 ? byArea(random) : triangles_[random.below(triangles_.size())];
-        const auto v = mesh_.corners(triangle);
-        glm::dvec3 n = glm::cross(v[1] - v[0], v[2] - v[0]);
-        const double length = glm::length(n);
-        n /= length;
-        const uint64_t corner = random.below(3);
-        if (kind == 3) return {v[corner], n};
-        if (kind == 2) return {glm::mix(v[corner], v[(corner + 1) % 3], random.unit()), n};
-        double a = random.unit(), b = random.unit();
-        if (a + b > 1) a = 1 - a, b = 1 - b;
-        return {v[0] + a * (v[1] - v[0]) + b * (v[2] - v[0]), n};
-    }
-
-private:
-    uint64_t byArea(SampleRandom& random) const {
-        const double at = random.unit() * areaUpTo_.back();
-        const auto found = std::upper_bound(areaUpTo_.begin(), areaUpTo_.end(), at);
-        return triangles_[std::min<size_t>(found - areaUpTo_.begin(), areaUpTo_.size() - 1)];
-    }
-
-    const IndexedMesh& mesh_;
-    std::vector<uint32_t> triangles_;  ///< triangles with area
-    std::vector<double> areaUpTo_;     ///< their areas, summed up
-};
-
 /// Returns an upper bound on the distance of a world point to the rendered surface.
 double distanceToSurface(const ReferenceCaster& caster, const LevelLeaves& leaves, const MeshSampler::Sample& sample,
                          double cell, double certifiedError) {
@@ -343,7 +233,7 @@ Result<SurfaceDistance> measureSurfaceDistance(const PageCache& cache, const Mes
     SurfaceDistance result;
     result.cell = cell;
     result.certifiedErrorMax = certified;
-    BlockRunner runner(options);
+    SampleRunner runner(options.threads, options.progress);
     const Error cancelled = Error::cancelled();
 
     std::vector<float> toSurface(options.samples);

@@ -19,7 +19,7 @@
 #include <vector>
 
 #include "builder/measure/mesh_bvh.h"
-#include "builder/paper/mesh_sides.h"
+#include "builder/measure/mesh_sides.h"
 #include "builder/paper/root_grid.h"
 
 namespace vcp {

@@ -34,11 +34,23 @@ constexpr KindName kKinds[] = {
     {OutputKind::JsonText, ".json", "JSON"},    {OutputKind::Svg, ".svg", "an SVG"},
     {OutputKind::Text, ".csv", "text"},         {OutputKind::Text, ".md", "text"},
     {OutputKind::Ply, ".ply", "a PLY mesh"},    {OutputKind::Obj, ".obj", "an OBJ mesh"},
+    {OutputKind::Stl, ".stl", "an STL mesh"},   {OutputKind::Glb, ".glb", "a GLB"},
+    {OutputKind::Dxf, ".dxf", "a DXF"},
 };
 
 const char* wordsFor(OutputKind kind) {
     return std::find_if(std::begin(kKinds), std::end(kKinds), [&](const KindName& each) { return each.kind == kind; })
         ->words;
+}
+
+/// Whether the triangles behind the first 84 bytes, as many as are there whole, have the two bytes of zero at their
+/// end.
+bool looksLikeBinaryStl(std::span<const std::byte> start) {
+    constexpr size_t kHeader = 84, kTriangle = 50;
+    if (start.size() < kHeader + kTriangle) return false;
+    for (size_t end = kHeader + kTriangle; end <= start.size(); end += kTriangle)
+        if (start[end - 2] != std::byte(0) || start[end - 1] != std::byte(0)) return false;
+    return true;
 }
 
 /// Datasets and assets are marked: their header is written last, so that a mark can stand in its place until then.
@@ -171,6 +183,12 @@ bool beginsLike(OutputKind kind, std::span<const std::byte> start) {
             return text.starts_with("ply\n") || text.starts_with("ply\r");
         case OutputKind::Obj:
             return text.find('\0') == std::string_view::npos && firstOf("#vofgsum");
+        case OutputKind::Stl:
+            return text.starts_with("solid") || looksLikeBinaryStl(start);
+        case OutputKind::Glb:
+            return text.starts_with("glTF");
+        case OutputKind::Dxf:
+            return text.starts_with("999") || text.starts_with("  0") || text.starts_with("0\n");
     }
     return false;
 }

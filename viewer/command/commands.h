@@ -32,6 +32,8 @@ Command addInfo(CLI::App& vcp);
 Command addVerify(CLI::App& vcp);
 Command addRender(CLI::App& vcp);
 Command addView(CLI::App& vcp);
+Command addExport(CLI::App& vcp);
+Command addCompare(CLI::App& vcp);
 Command addStress(CLI::App& vcp);
 Command addBench(CLI::App& vcp);
 Command addDevices(CLI::App& vcp);

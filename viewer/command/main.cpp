@@ -8,6 +8,7 @@
 #include "streaming/web_address.h"
 #include "viewer/command/commands.h"
 #include "viewer/command/option_names.h"
+#include "viewer/command/suggestion.h"
 #include "viewer/command/terminal_text.h"
 
 namespace vcp {
@@ -24,6 +25,26 @@ void complain(const std::string& what) {
     std::fprintf(stderr, "vcp: %s\n", terminalText(message).c_str());
 }
 
+std::vector<std::string> commandNames(const CLI::App& app) {
+    std::vector<std::string> names;
+    for (const CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; }))
+        if (!command->get_group().empty()) names.push_back(command->get_name());
+    return names;
+}
+
+std::vector<std::string> optionNames(const CLI::App& app) {
+    std::vector<std::string> names;
+    for (const CLI::Option* option : app.get_options())
+        for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
+    return names;
+}
+
+/// Returns "; did you mean NAME?" where one of the names is near, else nothing.
+std::string suggestion(const std::string& typed, const std::vector<std::string>& names) {
+    const auto nearest = nearestName(typed, names);
+    return nearest ? "; did you mean " + *nearest + "?" : "";
+}
+
 /// Adds `vcp help`, `vcp help CMD`, `vcp help bench rays`.
 Command addHelp(CLI::App& vcp) {
     auto words = std::make_shared<std::vector<std::string>>();
@@ -35,7 +56,9 @@ Command addHelp(CLI::App& vcp) {
         for (const std::string& word : *words) {
             const auto found = about->get_subcommands([&](const CLI::App* sub) { return sub->check_name(word); });
             if (found.empty())
-                return Error{.code = ErrorCode::Usage, .message = "there is no command \"" + word + "\""};
+                return Error{
+                    .code = ErrorCode::Usage,
+                    .message = "there is no command \"" + word + "\"" + suggestion(word, commandNames(*about))};
             about = found.front();
             path += " " + word;
         }
@@ -55,15 +78,30 @@ std::string commandPath(const CLI::App& vcp) {
     return path;
 }
 
-/// Returns the files that a command was given, shortened; empty without any.
-std::string inputsOf(const CLI::App& vcp) {
+const CLI::App& innermost(const CLI::App& vcp) {
     const CLI::App* at = &vcp;
     while (!at->get_subcommands().empty()) at = at->get_subcommands().front();
+    return *at;
+}
+
+/// Returns the files that a command was given, shortened; empty without any.
+std::string inputsOf(const CLI::App& vcp) {
     std::vector<std::string> inputs;
-    for (const CLI::Option* option : at->get_options())
+    for (const CLI::Option* option : innermost(vcp).get_options())
         if (option->get_positional()) inputs.insert(inputs.end(), option->results().begin(), option->results().end());
     if (inputs.empty()) return {};
     return inputs.size() == 1 ? inputs.front() : inputs.front() + " and " + std::to_string(inputs.size() - 1) + " more";
+}
+
+/// Returns what the first word that nothing takes was meant to be.
+std::string suggestionFor(const CLI::App& vcp) {
+    const CLI::App& command = innermost(vcp);
+    for (const CLI::App* app : {&command, &vcp})
+        for (const std::string& word : app->remaining(false)) {
+            const std::string name = word.substr(0, word.find('='));
+            return suggestion(name, name.starts_with('-') ? optionNames(command) : commandNames(command));
+        }
+    return "";
 }
 
 int complainOfUsage(const CLI::App& vcp, const std::string& message) {
@@ -89,15 +127,18 @@ int runCommandLine(int argc, char** argv) {
     vcp.set_version_flag("--version", "vcp " VCP_VERSION);
     vcp.get_formatter()->column_width(28);
     vcp.footer("`vcp help CMD` says how a command is used.");
-    const std::vector<Command> commands = {addBuild(vcp),   addInfo(vcp),   addVerify(vcp), addRender(vcp),
-                                           addView(vcp),    addStress(vcp), addBench(vcp),  addMeso(vcp),
-                                           addDevices(vcp), addHelp(vcp),   addManual(vcp), addCompletions(vcp)};
+    const std::vector<Command> commands = {addBuild(vcp),  addInfo(vcp),       addVerify(vcp),  addRender(vcp),
+                                           addView(vcp),   addExport(vcp),     addCompare(vcp), addStress(vcp),
+                                           addBench(vcp),  addMeso(vcp),       addDevices(vcp), addHelp(vcp),
+                                           addManual(vcp), addCompletions(vcp)};
     try {
         vcp.parse(argc, argv);
     } catch (const CLI::CallForHelp&) {
         return printLine(vcp.help()) ? 0 : kFailed;
     } catch (const CLI::CallForVersion& version) {
         return printLine(version.what()) ? 0 : kFailed;
+    } catch (const CLI::ExtrasError& wrong) {
+        return complainOfUsage(vcp, wrong.what() + suggestionFor(vcp));
     } catch (const CLI::ParseError& wrong) {
         return complainOfUsage(vcp, wrong.what());
     }

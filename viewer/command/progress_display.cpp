@@ -21,6 +21,11 @@ int terminalColumns(std::FILE* out) {
     return size.ws_col;
 }
 
+/// Returns a time that is left: more than a guess of whole seconds it is not.
+std::string timeLeft(double seconds) {
+    return seconds < 59 ? fmt::format("{:.0f} s", std::ceil(seconds)) : formatSeconds(std::ceil(seconds));
+}
+
 // Progress that stands still is shown again after so long, with its new counts.
 constexpr double kJsonSeconds = 2, kPlainSeconds = 30, kBarSeconds = 0.5;
 
@@ -46,7 +51,7 @@ void ProgressDisplay::update(std::string_view stage, double fraction, const Prog
     std::string facts;
     if (details.triangles > 0) facts += fmt::format(", {} triangles", formatCount(details.triangles));
     if (details.tempBytes > 0) facts += fmt::format(", {} temporary", formatBytes(details.tempBytes));
-    if (isKnown) facts += fmt::format(", {} left", formatSeconds(left));
+    if (isKnown) facts += fmt::format(", {} left", timeLeft(left));
     if (style_ == ProgressStyle::Bar) return drawBar(stage, fraction, facts);
 
     const int steps = style_ == ProgressStyle::Json ? 100 : 10;

@@ -49,7 +49,7 @@ void addSamples(CLI::App& app, uint32_t& samples, const std::string& description
         ->check(CLI::Range(1, int(kMostSamples)));
 }
 
-void addRenderSettings(CLI::App& app, RenderSettings& settings) {
+void addCameraSettings(CLI::App& app, RenderSettings& settings) {
     addParsed(
         app, "--camera", settings.camera, parseCamera,
         "a view, a camera file, or an azimuth and an elevation below 90 degrees, like 30,35, and a magnification, "
@@ -59,6 +59,10 @@ void addRenderSettings(CLI::App& app, RenderSettings& settings) {
         ->type_name("VIEW|FILE")
         ->default_str("fit");
     addUp(app, settings.up);
+}
+
+void addRenderSettings(CLI::App& app, RenderSettings& settings) {
+    addCameraSettings(app, settings);
     addLight(app, settings.shading);
     addParsed(app, "--shading", settings.shading.mode, shadingNamed,
               fmt::format("one of {}", fmt::join(kShadingNames, ", ")),

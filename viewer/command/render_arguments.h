@@ -6,6 +6,9 @@
 
 namespace vcp {
 
+/// Adds --camera and --up.
+void addCameraSettings(CLI::App& app, RenderSettings& settings);
+
 void addRenderSettings(CLI::App& app, RenderSettings& settings);
 
 /// Adds --samples, with the value that there is as the default.

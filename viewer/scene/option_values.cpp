@@ -58,6 +58,20 @@ std::optional<PlaneChoice> parsePlane(std::string_view text) {
     return plane;
 }
 
+double offsetIn(const PlaneChoice& plane, const Box& bounds) {
+    if (!plane.isRelative) return plane.offset;
+    // An axis' offset counts from the box's lower side, whichever side is kept.
+    const glm::dvec3 axis = glm::abs(plane.normal);
+    return glm::dot(plane.normal, bounds.low) + plane.offset * glm::dot(axis, bounds.high - bounds.low);
+}
+
+std::optional<Box> parseBox(std::string_view text) {
+    const auto list = parseNumbers(text);
+    if (list.size() != 6) return std::nullopt;
+    const Box box{{list[0], list[1], list[2]}, {list[3], list[4], list[5]}};
+    return glm::all(glm::lessThan(box.low, box.high)) ? std::optional(box) : std::nullopt;
+}
+
 std::optional<glm::dvec3> parseDirection(std::string_view text) {
     const auto list = parseNumbers(text);
     if (list.size() != 3) return std::nullopt;

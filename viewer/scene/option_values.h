@@ -10,6 +10,8 @@
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 
+#include "viewer/camera/orbit_camera.h"
+
 namespace vcp {
 
 /// A length: world units ("0.25", "1e-3"), or a part of the bounding box's diagonal ("0.01%").
@@ -51,6 +53,12 @@ struct PlaneChoice {
 /// Parses what to keep: "x<0.2", "z>50%" (of the bounding box), or four numbers "a,b,c,d" for ax + by + cz >= d.
 /// Returns nothing when malformed.
 std::optional<PlaneChoice> parsePlane(std::string_view text);
+
+/// Returns the offset of a plane in world units, in a box.
+double offsetIn(const PlaneChoice& plane, const Box& bounds);
+
+/// Parses two corners, "x,y,z,x,y,z", each of the first below its other. Returns nothing when malformed.
+std::optional<Box> parseBox(std::string_view text);
 
 /// Parses three numbers, "1,0,-0.5", not all zero. Returns nothing when malformed.
 std::optional<glm::dvec3> parseDirection(std::string_view text);

@@ -47,14 +47,7 @@ Result<void> RenderSettings::checkFor(const Dataset& dataset) const {
 
 std::vector<SectionPlane> RenderSettings::sectionPlanes(const Box& bounds) const {
     std::vector<SectionPlane> planes;
-    for (const PlaneChoice& plane : sections) {
-        // An axis' offset counts from the box's lower side, whichever side is kept.
-        const glm::dvec3 axis = glm::abs(plane.normal);
-        const double offset = plane.isRelative ? glm::dot(plane.normal, bounds.low) +
-                                                     plane.offset * glm::dot(axis, bounds.high - bounds.low)
-                                               : plane.offset;
-        planes.push_back({plane.normal, offset});
-    }
+    for (const PlaneChoice& plane : sections) planes.push_back({plane.normal, offsetIn(plane, bounds)});
     return planes;
 }
 

@@ -68,7 +68,8 @@ protected:
 };
 std::unique_ptr<TestFolder> CommandLine::folder_;
 
-constexpr const char* kCommands[] = {"build", "info", "verify", "render", "view", "stress", "devices", "bench", "meso"};
+constexpr const char* kCommands[] = {"build",   "info",   "verify",  "render", "view", "export",
+                                     "compare", "stress", "devices", "bench",  "meso"};
 
 TEST_F(CommandLine, HelpOfEveryCommandBothWays) {
     const Ran all = run({"--help"});
@@ -98,6 +99,10 @@ TEST_F(CommandLine, WrongUsageEndsWith2) {
         {{}, "command is needed"},
         {{"fly"}, "fly"},
         {{"help", "fly"}, "fly"},
+        {{"help", "biuld"}, "did you mean build?"},
+        {{"rendr", mesh}, "did you mean render?"},
+        {{"render", mesh, "-o", "x.png", "--sectoin", "x<0"}, "did you mean --section?"},
+        {{"bench", "ray"}, "did you mean rays?"},
         {{"build"}, "vcp help build"},
         {{"build", mesh}, "--output"},
         {{"build", mesh, "-o", "x.vcp", "--cell", "wide"}, "wide"},

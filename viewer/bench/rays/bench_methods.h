@@ -23,7 +23,7 @@
 #include <string>
 #include <vector>
 
-#include "builder/paper/mesh_sides.h"
+#include "builder/measure/mesh_sides.h"
 #include "builder/paper/paper_octree.h"
 #include "viewer/bench/rays/bench_tracer.h"
 

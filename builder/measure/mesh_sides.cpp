@@ -1,4 +1,4 @@
-#include "builder/paper/mesh_sides.h"
+#include "builder/measure/mesh_sides.h"
 
 #include <algorithm>
 #include <cmath>
