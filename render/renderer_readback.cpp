@@ -255,8 +255,10 @@ const std::optional<FeedbackPicture>& Renderer::feedbackPicture() const { return
 Result<void> Renderer::present(uint32_t width, uint32_t height, const DrawOver& drawOver) {
     View& v = *view_;
     if (!v.swapchain) return Error{.code = ErrorCode::Usage, .message = "the renderer was made without a window"};
-    if (!v.drawn) return {};
-    View::Frame& frame = v.frames[*v.drawn];
+    // The first picture shows its background until it is finished.
+    const std::optional<size_t> shown = v.drawn ? v.drawn : v.begun;
+    if (!shown) return {};
+    View::Frame& frame = v.frames[*shown];
     const FrameResources& resources = *frame.layers.front().resources;
     const DeviceWork before = v.shared->device->work();
     const auto submission = v.swapchain->show(resources.picture(), resources.size(), {width, height}, drawOver);

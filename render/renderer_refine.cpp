@@ -14,13 +14,13 @@ namespace {
 // What a ray through mesostructure costs, in rays through pages.
 constexpr uint32_t kSurfaceRays = 8;
 
+}  // namespace
+
 uint32_t raysPerPixel(const FrameRequest& request, bool hasSurfaces) {
     const Shading& shading = request.shading;
     const uint32_t light = hasLight(shading) ? (shading.shadows ? 1 : 0) + shading.occlusionRays : 0;
     return 1 + light + (hasSurfaces ? kSurfaceRays : 0);
 }
-
-}  // namespace
 
 Result<uint32_t> Renderer::refineAhead() {
     return view_->shared->tryAgain(*view_, [&] { return view_->drawPart(); });
@@ -54,7 +54,7 @@ Result<uint32_t> Renderer::View::drawPart() {
     FrameRequest request = shown.request;
     request.sample = samples;
     frame.part = picturePart(request, nextPart, raysPerPixel(request, shared->meso != nullptr));
-    VCP_TRY(submit(kRefiningFrame, frame.part->request, {}));
+    VCP_TRY(submit(kRefiningFrame, frame.part->request, {}, false));
     shown.lastUse = std::max(shown.lastUse, frame.submission);
     ++nextPart;
     if (!frame.part->isLast) return samples;

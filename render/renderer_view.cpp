@@ -115,6 +115,7 @@ bool Renderer::View::isComplete() const {
 }
 
 void Renderer::View::forgetFrames() {
+    abandonFrame();
     drawn.reset();
     lastDone.reset();
     for (Frame& frame : frames) {
@@ -126,6 +127,7 @@ void Renderer::View::forgetFrames() {
 void Renderer::View::release() {
     if (gone) gone();
     if (shared->device) static_cast<void>(shared->device->waitForAll());
+    abandonFrame();
     drawn.reset();
     lastDone.reset();
     swapchain.reset();
