@@ -141,10 +141,11 @@ TEST_F(FramesAhead, AFrameThatTakesLongIsDrawnStepByStep) {
         ASSERT_TRUE(isLast) << isLast.error().line();
         EXPECT_EQ(*isLast, !renderer_->isUnfinished());
         update(request);
-        EXPECT_EQ(renderer_->lastDone()->request.width,
-                  renderer_->isUnfinished() ? 96u : renderer_->lastDone()->request.width);
+        if (renderer_->isUnfinished()) {
+            EXPECT_EQ(renderer_->lastDone()->request.width, other.width) << "it is not taken in before it is finished";
+        }
     }
-    EXPECT_GT(steps, 10);
+    EXPECT_GE(steps, 5);
     EXPECT_EQ(renderer_->finishedPart(), 1);
     EXPECT_EQ(*renderer_->readPicture(), expected);
     update(request);
