@@ -1,7 +1,6 @@
 #!/bin/bash
 # The pictures of docs/window.md, from a statue that make_scan makes, in a window under Xvfb that xdotool drives.
-# Usage: make_screenshots.sh VCP MAKE_SCAN. Writes images/window-*.jpg beside itself. Takes some minutes without a GPU; on an idle
-# machine, since the status line shows how long frames take.
+# Usage: make_screenshots.sh VCP MAKE_SCAN. Writes images/window-*.jpg beside itself. Takes some minutes without a GPU.
 set -euo pipefail
 vcp=$(realpath "$1") makeScan=$(realpath "$2") images=$(dirname "$(realpath "$0")")/images
 folder=$(mktemp -d)
@@ -22,75 +21,90 @@ awk 'BEGIN { R=192; S=384; pi=atan2(0,-1)
         print 3, o+r*S+u, o+r*S+v, o+(r+1)*S+u; print 3, o+r*S+v, o+(r+1)*S+v, o+(r+1)*S+u } }' >ball.ply
 "$vcp" build ball.ply -o ball.vcp --progress none >/dev/null
 exec 3>display
-Xvfb -noreset -displayfd 3 -screen 0 1024x768x24 >/dev/null 2>&1 &
+Xvfb -noreset -displayfd 3 -screen 0 1600x1000x24 >/dev/null 2>&1 &
 xvfb=$!
 for _ in $(seq 100); do [ -s display ] && break; sleep 0.1; done
 export DISPLAY=:$(cat display)
 
-# opens FILE ARGUMENT...
+# opens THEME SIZE NAME ARGUMENT...: a window with that name in its title.
 opens() {
-    "$vcp" view "$@" --size 960x640 >/dev/null 2>log &
+    local theme=$1 size=$2 name=$3; shift 3
+    GTK_THEME=Adwaita:$theme "$vcp" view "$@" --size "$size" --samples 4 >/dev/null 2>log &
     viewer=$! window=
     for _ in $(seq 200); do
-        window=$(xdotool search --name "$1" 2>/dev/null | head -1) && [ -n "$window" ] && break
+        window=$(xdotool search --name "$name" 2>/dev/null | head -1) && [ -n "$window" ] && break
         kill -0 $viewer 2>/dev/null || { cat log >&2; exit 1; }
         sleep 0.1
     done
-    at 5 300
+    away
     sleep 3
 }
-closes() { kill -9 "$viewer"; wait "$viewer" 2>/dev/null || true; }
+# closes: as by hand, so that thumbnails are kept.
+closes() { key ctrl+q; wait "$viewer" || true; }
 at() { xdotool mousemove --window "$window" "$@"; }
+away() { at 5 300; }
 key() { local k; for k; do xdotool key --window "$window" "$k"; sleep 0.3; done; }
 busy() { awk '{ print $14 + $15 }' "/proc/$viewer/stat"; }
 # rests: waits until the window has been at rest for two seconds.
 rests() {
     local before
-    for _ in $(seq 60); do
+    for _ in $(seq 150); do
         before=$(busy); sleep 2
         [ $(($(busy) - before)) -le 5 ] && return
     done
 }
-# takes NAME: the picture, settled and drawn once more: the status line says what a frame takes, not what it took to compile.
+# takes NAME: the picture, settled, with its samples.
 takes() {
     rests
-    key l l
-    rests
     import -silent -window "$window" now.png
-    convert now.png -quality 88 "$images/window-$1.jpg"
+    convert now.png -quality 90 "$images/window-$1.jpg"
 }
 
-opens statue.vcp --shadows --occlusion 16
-at 480 320 click 5
-at 5 300
+opens dark 1600x1000 statue statue.vcp --shadows --occlusion 8
 takes whole
-key r
-for _ in $(seq 6); do at 490 150 click 4; sleep 0.5; done
-at 5 300
-takes close
-key r d
-for point in "455 250" "490 300" "470 420"; do rests; at $point click 1; done
-rests
-key Tab
-at 5 300
+key Tab d
+for point in "600 400" "640 480" "620 700"; do rests; at $point click 1; done
+away
 takes measuring
+key F1
+takes keys
+key Escape d Tab
 closes
 
-opens ball.vcp --camera iso --section 'z<50%' --caps --shadows
-for _ in 1 2 3; do at 480 320 click 4; sleep 0.5; done
-at 5 300
+opens dark 800x600 statue statue.vcp --shadows --occlusion 8
+key Tab f
+takes small
+key Tab
+for _ in $(seq 6); do at 410 150 click 4; sleep 0.5; done
+away
+takes close
+closes
+
+opens light 1600x1000 ball ball.vcp --camera iso --section 'z<50%' --caps --shadows --occlusion 8
+key Tab f
+takes light
+key Tab
+closes
+opens dark 800x600 ball ball.vcp --camera iso --section 'z<50%' --caps --shadows
+at 400 300
+for _ in 1 2; do xdotool click 4; sleep 0.5; done
+away
 takes section
 closes
 
-opens statue.vcp --shading steps
+opens dark 800x600 statue statue.vcp --shading steps
 takes steps
 closes
 
 # A budget that is too small, and views that miss pages: what the rays of the last one asked for stays in the inset.
-opens statue.vcp --budget 32M --error-pixels 0.25
+opens dark 800x600 statue statue.vcp --budget 32M --error-pixels 0.25
 key i b
 for view in 7 9 1; do key $view; sleep 2; done
-for _ in 1 2 3; do at 480 200 click 4; sleep 0.5; done
-at 5 300
+for _ in 1 2 3; do at 400 200 click 4; sleep 0.5; done
+away
 takes streaming
+closes
+
+opens light 800x600 vcp
+takes welcome
 closes

@@ -9,8 +9,6 @@ namespace vcp {
 
 namespace {
 
-// A part takes a software device about a tenth of a second.
-constexpr uint64_t kPartRays = 1 << 18;
 // The shade pass averages occlusion over 2 pixels around; parts and what is around them are of whole tiles.
 constexpr uint32_t kAround = frame::kTileSize;
 constexpr uint32_t kLeastRowsWithAround = 8 * kAround;

@@ -8,6 +8,9 @@
 
 namespace vcp {
 
+/// What a software device casts in about a tenth of a second.
+constexpr uint64_t kPartRays = 1 << 18;
+
 struct PicturePart {
     FrameRequest request;        ///< what is drawn: the part, with rows around it that occlusion is averaged over
     uint32_t row = 0, rows = 0;  ///< the part: rows of the picture

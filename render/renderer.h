@@ -105,6 +105,15 @@ public:
     /// are in flight, for the older one. `cursor`: a pixel of the picture whose hit comes back with the frame. Errors:
     /// those of render(), also of frames before.
     Result<void> renderAhead(const FrameRequest& request, const std::optional<PicturePixel>& cursor = {});
+    /// On a software device, renderAhead() only begins a frame that would take it longer than about a second: it is
+    /// drawn step by step, of less than a tenth of a second each, between which the device can present. Whether there
+    /// is one, and how much of it is drawn, 0 to 1.
+    [[nodiscard]] bool isUnfinished() const;
+    [[nodiscard]] double finishedPart() const;
+    /// Hands the next step to the device, unless one is in flight. Returns whether that was the last one: until then
+    /// the picture before is the last picture. Where pages have come or gone meanwhile, the frame is forgotten, as by
+    /// the next render() or renderAhead(). Errors: those of renderAhead().
+    Result<bool> continueFrame();
     /// Adds a part of the next sample (picture_parts.h) to the last picture, and returns when it is handed to the GPU.
     /// Waits only where a part is in flight, for that. Returns how many whole samples the picture then has, and 0 as
     /// refine() does. Errors: those of refine().

@@ -52,6 +52,8 @@ Result<void> Renderer::View::cast(size_t which, const FrameRequest& request, con
     frame.request = request;
     frame.cursor = cursor;
     frame.part.reset();
+    frame.steps.clear();
+    frame.nextStep = 0;
     frame.submission = 0;
     frame.isAhead = false;
     frame.stats = hostStats(datasets, picture);

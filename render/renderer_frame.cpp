@@ -14,6 +14,12 @@ namespace vcp {
 
 namespace {
 
+// What takes a software device longer, about a second, is drawn step by step.
+constexpr uint64_t kMostRaysAtOnce = 8 * kPartRays;
+// A step is to take so long: what presents waits for it.
+constexpr double kStepSeconds = 0.04;
+constexpr uint64_t kFewestStepRays = 1 << 12;
+
 MesoShading mesoShading(ShadingMode mode) {
     switch (mode) {
         case ShadingMode::Normals:
@@ -106,8 +112,18 @@ Result<void> Renderer::View::prepare(Frame& frame, size_t i) {
     if (shared->composes()) {
         VCP_TRY(frame.target.resize(*shared->device, resources.size()));
         resources.setTarget(&frame.layers.front().resources->picture(), &frame.target.depths());
-        VCP_TRY(shared->compose.prepare(resources, constants));
     }
+    if (drawing.reports()) VCP_TRY(drawing.feedback.prepare(*shared->device, resources, layer.table));
+    return choosePipelines(frame, i);
+}
+
+Result<void> Renderer::View::choosePipelines(Frame& frame, size_t i) {
+    const Layer& layer = layers[i];
+    LayerFrame& drawing = frame.layers[i];
+    const FrameRequest& request = drawing.request;
+    const PassConstants& constants = drawing.constants;
+    FrameResources& resources = *drawing.resources;
+    if (shared->composes()) VCP_TRY(shared->compose.prepare(resources, constants));
     if (frame.part && i == 0) {
         resources.setSums(sums.buffer(), frames[*drawn].layers.front().resources->picture());
         VCP_TRY(shared->accumulate.prepare(resources, constants));
@@ -122,12 +138,30 @@ Result<void> Renderer::View::prepare(Frame& frame, size_t i) {
         VCP_TRY(shared->trace.prepare(resources, constants, sections));
     const bool traceLight = hasLight(request.shading);
     if (traceLight) VCP_TRY(shared->light.prepare(resources, constants));
-    if (drawing.reports()) VCP_TRY(drawing.feedback.prepare(*shared->device, resources, layer.table));
     if (drawing.listened) VCP_TRY(shared->feedback.prepare(resources, constants));
     return shared->shade.prepare(resources, constants, traceLight);
 }
 
-void Renderer::View::record(VkCommandBuffer commands, Frame& frame, size_t i) {
+void Renderer::View::record(VkCommandBuffer commands, Frame& frame, const FrameStep& step, TileRange tiles) {
+    const LayerFrame& drawing = frame.layers[step.layer];
+    switch (step.pass) {
+        case FrameStep::Pass::Beam:
+            return recordBeam(commands, frame, step.layer);
+        case FrameStep::Pass::Trace:
+            if (layers[step.layer].isPaper())
+                shared->paperTrace.record(commands, *drawing.resources);
+            else
+                shared->trace.record(commands, *drawing.resources, tiles);
+            return;
+        case FrameStep::Pass::Light:
+            if (tiles.first == 0) drawing.timer.mark(commands, 2);
+            return shared->light.record(commands, *drawing.resources, tiles);
+        case FrameStep::Pass::Shade:
+            return recordShade(commands, frame, step.layer);
+    }
+}
+
+void Renderer::View::recordBeam(VkCommandBuffer commands, Frame& frame, size_t i) {
     const Layer& layer = layers[i];
     LayerFrame& drawing = frame.layers[i];
     FrameResources& resources = *drawing.resources;
@@ -150,12 +184,14 @@ void Renderer::View::record(VkCommandBuffer commands, Frame& frame, size_t i) {
     timer.mark(commands, 0);
     shared->beam.record(commands, resources);
     timer.mark(commands, 1);
-    if (layer.isPaper())
-        shared->paperTrace.record(commands, resources);
-    else
-        shared->trace.record(commands, resources);
-    timer.mark(commands, 2);
-    if (hasLight(drawing.request.shading)) shared->light.record(commands, resources);
+}
+
+/// Records all that follows the rays.
+void Renderer::View::recordShade(VkCommandBuffer commands, Frame& frame, size_t i) {
+    LayerFrame& drawing = frame.layers[i];
+    FrameResources& resources = *drawing.resources;
+    const PassTimer& timer = drawing.timer;
+    if (!hasLight(drawing.request.shading)) timer.mark(commands, 2);
     timer.mark(commands, 3);
     shared->shade.record(commands, resources);
     if (shared->composes()) shared->compose.record(commands, resources);
@@ -197,7 +233,29 @@ Result<void> Renderer::renderAhead(const FrameRequest& request, const std::optio
     return view_->shared->tryAgain(*view_, [&] { return view_->drawAhead(request, cursor); });
 }
 
+Result<bool> Renderer::continueFrame() {
+    return view_->shared->tryAgain(*view_, [&] { return view_->drawStep(); });
+}
+
+bool Renderer::isUnfinished() const { return view_->begun.has_value(); }
+
+double Renderer::finishedPart() const {
+    if (!view_->begun) return 1;
+    const View::Frame& frame = view_->frames[*view_->begun];
+    // The other passes take next to nothing.
+    double done = 0, all = 0;
+    for (size_t i = 0; i < frame.steps.size(); ++i) {
+        all += frame.steps[i].raysPerPixel;
+        if (i < frame.nextStep) done += frame.steps[i].raysPerPixel;
+    }
+    if (frame.isUnfinished())
+        if (const FrameStep& step = frame.steps[frame.nextStep]; frame.nextTile > 0)
+            done += step.raysPerPixel * double(frame.nextTile) / View::listedTiles(frame, step.layer);
+    return all > 0 ? done / all : 0;
+}
+
 Result<FrameStats> Renderer::View::draw(const FrameRequest& request, const std::function<bool()>& cancel) {
+    abandonFrame();
     drawn.reset();
     if (!shared->device || !isComplete()) return kGone;
     VCP_TRY(checkRequest(request));
@@ -206,7 +264,7 @@ Result<FrameStats> Renderer::View::draw(const FrameRequest& request, const std::
     if (isCastOnHost(request)) {
         VCP_TRY(cast(0, request, {}, cancel));
     } else {
-        VCP_TRY(submit(0, request, {}));
+        VCP_TRY(submit(0, request, {}, false));
         VCP_TRY(takeInAll());
     }
     FrameStats& stats = lastDone->stats;
@@ -218,40 +276,156 @@ Result<FrameStats> Renderer::View::draw(const FrameRequest& request, const std::
 }
 
 Result<void> Renderer::View::drawAhead(const FrameRequest& request, const std::optional<PicturePixel>& cursor) {
+    abandonFrame();
     const size_t next = drawn ? (*drawn + 1) % kFramesAhead : 0;
-    drawn.reset();
+    const auto before = std::exchange(drawn, std::nullopt);
     if (!shared->device || !isComplete()) return kGone;
     VCP_TRY(checkRequest(request));
-    const DeviceWork before = shared->device->work();
+    const DeviceWork work = shared->device->work();
     Frame& frame = frames[next];
     VCP_TRY(shared->device->waitFor(frame.lastUse));
     VCP_TRY(takeInDone());
     VCP_TRY(makeLayers(frame));
     const bool isInside = cursor && cursor->x < request.width && cursor->y < request.height;
     const std::optional<PicturePixel> inside = isInside ? cursor : std::nullopt;
-    VCP_TRY(isCastOnHost(request) ? cast(next, request, inside, {}) : submit(next, request, inside));
+    // What takes long is drawn step by step, which the device's passes can.
+    const bool isLong = request.shading.occlusionRays > 0 && raysOf(request) > kMostRaysAtOnce;
+    VCP_TRY(!isLong && isCastOnHost(request) ? cast(next, request, inside, {}) : submit(next, request, inside, true));
     frame.isAhead = true;
-    frame.stats.submissions = shared->device->work().submissions - before.submissions;
-    frame.stats.hostWaits = shared->device->work().waits - before.waits;
+    frame.stats.submissions = shared->device->work().submissions - work.submissions;
+    frame.stats.hostWaits = shared->device->work().waits - work.waits;
+    if (frame.isUnfinished()) {
+        begun = next;
+        drawn = before;  // what is shown until then
+        return {};
+    }
     drawn = next;
     samples = 1, nextPart = 0;
     return {};
 }
 
-/// Submits a frame. Precondition: nothing in flight uses it.
+Result<bool> Renderer::View::drawStep() {
+    if (!shared->device) return kGone;
+    if (!begun) return false;
+    Frame& frame = frames[*begun];
+    if (!shared->device->isDone(frame.submission)) return false;
+    for (size_t i = 0; i < layers.size(); ++i) {
+        refreshTable(layers[i]);
+        // Pages have come and gone: the rest of the frame would not fit what is drawn of it.
+        const bool isBegun = i <= frame.steps[frame.nextStep - 1].layer;  // the beams were the first step
+        if (!isBegun || layers[i].tableNumber == frame.layers[i].tableNumber) continue;
+        abandonFrame();
+        return false;
+    }
+    adaptSteps();
+    VCP_TRY(submitSteps(frame, true));
+    if (frame.isUnfinished()) return false;
+    drawn = std::exchange(begun, std::nullopt);
+    samples = 1, nextPart = 0;
+    return true;
+}
+
+void Renderer::View::abandonFrame() {
+    if (!begun) return;
+    Frame& frame = frames[*std::exchange(begun, std::nullopt)];
+    frame.steps.clear();
+    frame.submission = 0;
+}
+
+uint64_t Renderer::View::raysOf(const FrameRequest& request) const {
+    return uint64_t{request.width} * request.height * raysPerPixel(request, shared->meso != nullptr);
+}
+
+std::vector<FrameStep> Renderer::View::stepsOf(const FrameRequest& request) const {
+    std::vector<FrameStep> steps;
+    for (size_t i = 0; i < layers.size(); ++i) {
+        const FrameRequest drawable = layers[i].drawable(request);
+        steps.push_back({FrameStep::Pass::Beam, i, 0});
+        steps.push_back({FrameStep::Pass::Trace, i, layers[i].isPaper() ? 0u : 1u});
+        if (hasLight(drawable.shading)) steps.push_back({FrameStep::Pass::Light, i, raysPerPixel(drawable, false) - 1});
+        steps.push_back({FrameStep::Pass::Shade, i, 0});
+    }
+    return steps;
+}
+
+uint32_t Renderer::View::listedTiles(const Frame& frame, size_t i) {
+    return frame.layers[i].resources->counts().listedTiles;
+}
+
+TileRange Renderer::View::takeTiles(Frame& frame, bool one) const {
+    const FrameStep& step = frame.steps[frame.nextStep];
+    // The beams, a step of their own, are done, and have told how many there are.
+    const uint32_t all = one && step.raysPerPixel > 0 ? listedTiles(frame, step.layer) : 0;
+    TileRange tiles;
+    if (all > 0) {
+        const uint64_t wanted = stepRays / (uint64_t{frame::kTileSize} * frame::kTileSize * step.raysPerPixel);
+        const uint32_t column = frame.nextTile % frame::kTileRow;
+        const auto count = uint32_t(std::clamp<uint64_t>(wanted, 1, all));
+        tiles.first = frame.nextTile;
+        tiles.count = column == 0 && count >= frame::kTileRow ? count / frame::kTileRow * frame::kTileRow
+                                                              : std::min(count, frame::kTileRow - column);
+        frame.nextTile += tiles.count;
+        if (frame.nextTile < all) return tiles;
+    }
+    frame.nextTile = 0;
+    ++frame.nextStep;
+    return tiles;
+}
+
+void Renderer::View::adaptSteps() {
+    const std::chrono::duration<double> took = std::chrono::steady_clock::now() - stepBegan;
+    if (took.count() > 2 * kStepSeconds) stepRays = std::max(stepRays / 2, kFewestStepRays);
+    if (took.count() < kStepSeconds / 2) stepRays = std::min(stepRays * 2, kPartRays);
+}
+
+/// Submits a frame, or the first of its steps. Precondition: nothing in flight uses it.
 Result<void> Renderer::View::submit(size_t which, const FrameRequest& request,
-                                    const std::optional<PicturePixel>& cursor) {
+                                    const std::optional<PicturePixel>& cursor, bool mayTakeSteps) {
     Frame& frame = frames[which];
     frame.cast.reset();
     frame.request = request;
     frame.cursor = cursor;
     frame.stats = {.rays = uint64_t{request.width} * request.height};
     frame.isAhead = false;
+    const bool isStepwise = mayTakeSteps && shared->info.software && raysOf(request) > kMostRaysAtOnce;
+    frame.steps = stepsOf(request);
+    frame.nextStep = 0;
+    frame.nextTile = 0;
+    frame.began = std::chrono::steady_clock::now();
+    return submitSteps(frame, isStepwise);
+}
+
+Result<void> Renderer::View::submitSteps(Frame& frame, bool one) {
     VCP_TRY_ASSIGN(auto commands, shared->device->beginCommands());
     barrierToAll(commands);
+    bool isFirst = true, goesOn = true;
+    while (frame.isUnfinished() && goesOn) {
+        const FrameStep step = frame.steps[frame.nextStep];
+        if (step.pass == FrameStep::Pass::Beam) {
+            VCP_TRY(prepare(frame, step.layer));
+        } else if (isFirst) {
+            VCP_TRY(choosePipelines(frame, step.layer));
+            frame.layers[step.layer].resources->bind(commands);
+        }
+        record(commands, frame, step, takeTiles(frame, one));
+        isFirst = false;
+        if (one && step.pass == FrameStep::Pass::Beam) frame.layers[step.layer].resources->recordListedTiles(commands);
+        goesOn = !one;
+    }
+    if (!frame.isUnfinished()) {
+        addKnownStats(frame);
+        if (shared->meso) VCP_TRY(recordSurfaces(commands, frame));
+        if (frame.part) shared->accumulate.record(commands, *frame.layers.front().resources, frame.part->rows);
+    }
+    VCP_TRY_ASSIGN(const auto submission, shared->device->endCommands());
+    frame.submission = frame.lastUse = submission;
+    stepBegan = std::chrono::steady_clock::now();
+    return {};
+}
+
+/// Adds what is known when a frame is submitted.
+void Renderer::View::addKnownStats(Frame& frame) const {
     for (size_t i = 0; i < layers.size(); ++i) {
-        VCP_TRY(prepare(frame, i));
-        record(commands, frame, i);
         for (const Frame& each : frames)
             if (i < each.layers.size()) frame.stats.pipelines += each.layers[i].resources->pipelinesMade();
         Residency* const residency = layers[i].residency;
@@ -260,13 +434,7 @@ Result<void> Renderer::View::submit(size_t which, const FrameRequest& request,
         frame.stats.poolBytes += residency->pages().bytes();
         frame.stats.pagesInCut += uint32_t(residency->cut(number).size());
     }
-    if (shared->meso) VCP_TRY(recordSurfaces(commands, frame));
-    if (frame.part) shared->accumulate.record(commands, *frame.layers.front().resources, frame.part->rows);
     frame.stats.feedbackPasses = shared->feedback.passes();
-    frame.began = std::chrono::steady_clock::now();
-    VCP_TRY_ASSIGN(const auto submission, shared->device->endCommands());
-    frame.submission = frame.lastUse = submission;
-    return {};
 }
 
 bool Renderer::isBusy() {
@@ -301,7 +469,8 @@ Result<void> Renderer::View::takeInDone() {
     std::transform(frames.begin(), frames.end(), order.begin(), [](Frame& frame) { return &frame; });
     std::sort(order.begin(), order.end(), [](const Frame* a, const Frame* b) { return a->submission < b->submission; });
     for (Frame* frame : order)
-        if (frame->submission != 0 && shared->device->isDone(frame->submission)) VCP_TRY(takeIn(*frame));
+        if (frame->submission != 0 && !frame->isUnfinished() && shared->device->isDone(frame->submission))
+            VCP_TRY(takeIn(*frame));
     return {};
 }
 

@@ -60,7 +60,7 @@ Result<Picture> Renderer::View::hostPicture() {
 }
 
 Result<const Buffer*> Renderer::View::shownPicture() {
-    if (!paintOver) return &frames[*drawn].picture();
+    if (!paintOver || !drawn) return &frames[drawn ? *drawn : *begun].picture();
     VCP_TRY_ASSIGN(const auto picture, hostPicture());
     // Submissions that read the picture of before have ended: present() and copyPicture() wait for their own.
     if (painted.bytes() != picture.rgba.size()) {
@@ -275,8 +275,10 @@ const std::optional<FeedbackPicture>& Renderer::feedbackPicture() const { return
 Result<void> Renderer::present(uint32_t width, uint32_t height, const DrawOver& drawOver) {
     View& v = *view_;
     if (!v.swapchain) return Error{.code = ErrorCode::Usage, .message = "the renderer was made without a window"};
-    if (!v.drawn) return {};
-    View::Frame& frame = v.frames[*v.drawn];
+    // The first picture shows its background until it is finished.
+    const std::optional<size_t> shown = v.drawn ? v.drawn : v.begun;
+    if (!shown) return {};
+    View::Frame& frame = v.frames[*shown];
     const DeviceWork before = v.shared->device->work();
     VCP_TRY_ASSIGN(const auto picture, v.shownPicture());
     const auto submission = v.swapchain->show(*picture, frame.size(), {width, height}, drawOver);

@@ -55,7 +55,7 @@ Result<uint32_t> Renderer::View::drawPart() {
     FrameRequest request = shown.request;
     request.sample = samples;
     frame.part = picturePart(request, nextPart, raysPerPixel(request, shared->meso != nullptr));
-    VCP_TRY(submit(kRefiningFrame, frame.part->request, {}));
+    VCP_TRY(submit(kRefiningFrame, frame.part->request, {}, false));
     shown.lastUse = std::max(shown.lastUse, frame.submission);
     ++nextPart;
     if (!frame.part->isLast) return samples;

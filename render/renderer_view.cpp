@@ -120,6 +120,7 @@ Result<void> Renderer::View::hideAsAsked(const FrameRequest& request) {
         Layer& layer = layers[i];
         Residency* const visible = isHidden(request, i) ? nullptr : layer.dataset;
         if (layer.residency == visible) continue;
+        if (!isNews) abandonFrame();
         if (!isNews) VCP_TRY(takeInAll());
         isNews = true;
         if (!visible) layer.dataset->forgetView(number);
@@ -132,6 +133,7 @@ Result<void> Renderer::View::hideAsAsked(const FrameRequest& request) {
 }
 
 void Renderer::View::forgetFrames() {
+    abandonFrame();
     drawn.reset();
     lastDone.reset();
     for (Frame& frame : frames) {
@@ -143,6 +145,7 @@ void Renderer::View::forgetFrames() {
 void Renderer::View::release() {
     if (gone) gone();
     if (shared->device) static_cast<void>(shared->device->waitForAll());
+    abandonFrame();
     drawn.reset();
     lastDone.reset();
     swapchain.reset();

@@ -26,6 +26,16 @@ constexpr size_t kRefiningFrame = kFramesAhead;
 /// Number of time marks of a dataset in a frame: one before the beam pass, and one after each pass.
 constexpr uint32_t kPassMarks = 6;
 
+/// A pass over one of a frame's datasets. A frame that takes long is drawn step by step, a submission each, between
+/// which the device can do other things: a step is a pass, or, where rays are cast, as many tiles of it as take a short
+/// time.
+struct FrameStep {
+    enum class Pass { Beam, Trace, Light, Shade };
+    Pass pass = Pass::Beam;
+    size_t layer = 0;
+    uint32_t raysPerPixel = 0;  // 0: the pass is not parted
+};
+
 struct Renderer::View {
     View(std::shared_ptr<Shared> with, std::optional<SurfaceSource> window);
     ~View();
@@ -86,6 +96,9 @@ struct Renderer::View {
         MesoTarget surfaces;
         PassTimer surfacesTimer;
         FrameRequest request;
+        std::vector<FrameStep> steps;
+        size_t nextStep = 0;              // the first one that is not wholly submitted
+        uint32_t nextTile = 0;            // of that one
         std::optional<PicturePart> part;  // what is added to the last picture, where this is no picture of its own
         std::optional<PicturePixel> cursor;
         FrameStats stats;  // what is known when it is submitted
@@ -95,6 +108,7 @@ struct Renderer::View {
         bool isAhead = false;             // drawn with renderAhead()
         std::optional<CastPicture> cast;  // in place of what the layers' passes draw
 
+        [[nodiscard]] bool isUnfinished() const { return nextStep < steps.size(); }
         [[nodiscard]] const Buffer& picture() const {
             return cast ? cast->colours : layers.front().resources->picture();
         }
@@ -114,10 +128,13 @@ struct Renderer::View {
     std::vector<Layer> layers;                // one for each dataset, and at least one
     /// render() draws with the first one only; the last one is for parts of further samples, and is as small.
     std::array<Frame, kFramesAhead + 1> frames;
-    std::optional<size_t> drawn;  // number of the frame with the last picture, and with its hits
-    SampleSums sums;              // of that picture
-    uint32_t samples = 1;         // that it has
-    uint32_t nextPart = 0;        // of the sample that is being added
+    std::optional<size_t> drawn;        // number of the frame with the last picture, and with its hits
+    std::optional<size_t> begun;        // number of the frame that is drawn step by step, until all are submitted
+    SampleSums sums;                    // of that picture
+    uint32_t samples = 1;               // that it has
+    uint32_t nextPart = 0;              // of the sample that is being added
+    uint64_t stepRays = kPartRays / 8;  // rays of a step
+    std::chrono::steady_clock::time_point stepBegan;  // of the step that was submitted last
     std::optional<DoneFrame> lastDone;
     uint64_t framesDone = 0;  // counts those that were taken in
     uint64_t mesoSeen = 0;    // Shared::mesoVersion of the last update
@@ -160,14 +177,34 @@ struct Renderer::View {
     Result<uint32_t> castPart();
     [[nodiscard]] std::vector<HostDataset> hostDatasets() const;
     [[nodiscard]] std::optional<PixelHit> castHit(const Frame& frame, PicturePixel pixel) const;
-
-    Result<void> submit(size_t number, const FrameRequest& request, const std::optional<PicturePixel>& cursor);
+    /// What a picture costs, in rays through pages.
+    [[nodiscard]] uint64_t raysOf(const FrameRequest& request) const;
+    /// Submits the next step of the frame that was begun; as Renderer::continueFrame().
+    Result<bool> drawStep();
+    /// Forgets the frame that was begun.
+    void abandonFrame();
+    Result<void> submit(size_t number, const FrameRequest& request, const std::optional<PicturePixel>& cursor,
+                        bool mayTakeSteps);
+    /// Submits one of the frame's next steps, or all, and with the last one what follows them.
+    Result<void> submitSteps(Frame& frame, bool one);
+    [[nodiscard]] std::vector<FrameStep> stepsOf(const FrameRequest& request) const;
+    /// Returns the number of tiles that a frame's beams could not prove empty. Precondition: they are done.
+    static uint32_t listedTiles(const Frame& frame, size_t layer);
+    /// Returns the tiles of the frame's next step, and goes on behind them.
+    TileRange takeTiles(Frame& frame, bool one) const;
+    /// Makes steps shorter or longer by what the last one took.
+    void adaptSteps();
+    void addKnownStats(Frame& frame) const;
     Result<void> checkLimits(const Layer& layer, const FrameRequest& request) const;
     [[nodiscard]] PassConstants constantsFor(const Layer& layer, const FrameRequest& request) const;
     void refreshTable(Layer& layer) const;
     Result<void> prepareTable(Layer& layer, LayerFrame& frame);
     Result<void> prepare(Frame& frame, size_t layer);
-    void record(VkCommandBuffer commands, Frame& frame, size_t layer);
+    /// Chooses the passes' pipelines for what is recorded next.
+    Result<void> choosePipelines(Frame& frame, size_t layer);
+    void record(VkCommandBuffer commands, Frame& frame, const FrameStep& step, TileRange tiles);
+    void recordBeam(VkCommandBuffer commands, Frame& frame, size_t layer);
+    void recordShade(VkCommandBuffer commands, Frame& frame, size_t layer);
     /// Records the surfaces, over the datasets' picture.
     Result<void> recordSurfaces(VkCommandBuffer commands, Frame& frame);
 
@@ -200,7 +237,7 @@ struct Renderer::View {
                                                      std::span<const HitWords> words, const MesoReport& surfaces) const;
 };
 
-/// Returns the rays that a pixel takes, about, for picturePart().
+/// What a pixel costs, in rays through pages.
 uint32_t raysPerPixel(const FrameRequest& request, bool hasSurfaces);
 
 /// Whether pixels show the work of their rays.

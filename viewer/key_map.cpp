@@ -10,37 +10,38 @@ namespace vcp {
 namespace {
 
 constexpr KeyHelp kKeyMap[] = {
-    {"left drag", "orbit about the point under the cursor"},
-    {"right drag, shift + left drag", "pan"},
-    {"wheel", "zoom to the cursor"},
-    {"double click", "centre on the point under the cursor"},
-    {"ctrl + left drag", "turn the light"},
-    {"F", "fit all into the window"},
-    {"R, Home", "the view it opened with"},
-    {"1 3 7 9", "from the front, right, top, isometric"},
-    {"P", "perspective or orthographic"},
-    {"U", "the up axis: y or z"},
-    {"G", "fly: W A S D, E up, Q down, drag to look, wheel for speed; G or Esc ends it"},
-    {"Ctrl+1 ... Ctrl+9", "keep this view as a bookmark"},
-    {"Shift+1 ... Shift+9", "go to a bookmark"},
-    {"Ctrl+C, Ctrl+V", "copy the camera as JSON, go to the copied one"},
-    {"M", "shading mode"},
-    {"C", "colours of the scan, or clay"},
-    {"L", "the light follows the camera, or stays"},
-    {"S", "shadows"},
-    {"O", "ambient occlusion"},
-    {"X", "section through the middle; its arrow and shift + wheel move it, its ring turns it"},
-    {"B", "the subvolumes that are drawn, as boxes coloured by level"},
-    {"I", "inset: which rays asked for finer subvolumes"},
-    {"D", "measure: click points; Enter ends a line, Backspace takes a point back"},
-    {"Ctrl+E", "write what is measured: measurement-1.csv, .json"},
-    {"Ctrl+S", "save the picture: picture-1.png, of the size chosen in the panel"},
-    {"Ctrl+T", "save a turntable: turntable-1/picture-0001.png and so on, as chosen in the panel"},
-    {"Ctrl+B", "save a path through the bookmarks: path-1/picture-0001.png and so on"},
-    {"Tab", "the panel"},
-    {"F1", "this list"},
-    {"Esc", "ends what is going on, else the program"},
-    {"Ctrl+Q", "quit"},
+    {KeyGroup::Mouse, "left drag", "orbit about the point under the cursor"},
+    {KeyGroup::Mouse, "right drag, shift + left drag", "pan"},
+    {KeyGroup::Mouse, "wheel", "zoom to the cursor"},
+    {KeyGroup::Mouse, "double click", "centre on the point under the cursor"},
+    {KeyGroup::Mouse, "ctrl + left drag", "turn the light"},
+    {KeyGroup::View, "F", "fit all into the window"},
+    {KeyGroup::View, "R, Home", "the view it opened with"},
+    {KeyGroup::View, "1 3 7 9", "from the front, right, top, isometric"},
+    {KeyGroup::View, "P", "perspective or orthographic"},
+    {KeyGroup::View, "U", "the up axis: y or z"},
+    {KeyGroup::View, "G", "fly: W A S D, E up, Q down, drag to look, wheel for speed; G or Esc ends it"},
+    {KeyGroup::View, "Ctrl+1 ... Ctrl+9", "keep this view as a bookmark"},
+    {KeyGroup::View, "Shift+1 ... Shift+9", "go to a bookmark"},
+    {KeyGroup::View, "Ctrl+C, Ctrl+V", "copy the camera as JSON, go to the copied one"},
+    {KeyGroup::Look, "M", "shading mode"},
+    {KeyGroup::Look, "C", "colours of the scan, or clay"},
+    {KeyGroup::Look, "L", "the light follows the camera, or stays"},
+    {KeyGroup::Look, "S", "shadows"},
+    {KeyGroup::Look, "O", "ambient occlusion"},
+    {KeyGroup::Measure, "X", "section through the middle; its arrow and shift + wheel move it, its ring turns it"},
+    {KeyGroup::Look, "B", "the subvolumes that are drawn, as boxes coloured by level"},
+    {KeyGroup::Look, "I", "inset: which rays asked for finer subvolumes"},
+    {KeyGroup::Measure, "D", "measure: click points; Enter ends a line, Backspace takes a point back"},
+    {KeyGroup::Measure, "Ctrl+E", "write what is measured: measurement-1.csv, .json"},
+    {KeyGroup::Save, "Ctrl+S", "save the picture: picture-1.png, of the size chosen in the panel"},
+    {KeyGroup::Save, "Ctrl+T", "save a turntable: turntable-1/picture-0001.png and so on, as chosen in the panel"},
+    {KeyGroup::Save, "Ctrl+B", "save a path through the bookmarks: path-1/picture-0001.png and so on"},
+    {KeyGroup::Window, "Ctrl+O", "open a file"},
+    {KeyGroup::Window, "Tab", "the panel"},
+    {KeyGroup::Window, "F1", "this list"},
+    {KeyGroup::Window, "Esc", "ends what is going on, else the program"},
+    {KeyGroup::Window, "Ctrl+Q", "quit"},
 };
 
 /// Returns the direction in camera axes, as for Viewer::fly(); 0 for other keys.
@@ -64,6 +65,11 @@ glm::dvec3 flyDirectionOf(uint32_t key) {
 }
 
 }  // namespace
+
+const char* nameOf(KeyGroup group) {
+    static constexpr const char* kNames[] = {"Mouse", "View", "Light and looks", "Cut and measure", "Save", "Window"};
+    return kNames[size_t(group)];
+}
 
 std::span<const KeyHelp> keyMap() { return kKeyMap; }
 

@@ -11,7 +11,11 @@
 
 namespace vcp {
 
+enum class KeyGroup { Mouse, View, Look, Measure, Save, Window };
+const char* nameOf(KeyGroup group);
+
 struct KeyHelp {
+    KeyGroup group;
     const char* keys;
     const char* does;
 };

@@ -25,6 +25,8 @@ constexpr double kLoadingPollSeconds = 0.01;
 constexpr double kRefineSeconds = 0.1;
 constexpr double kRefineFrames = 3;
 
+constexpr double kStepPollSeconds = 0.004;
+
 constexpr int kLargestReduction = 8;
 constexpr double kZoomPerNotch = 0.85;
 constexpr double kSectionPerNotch = 0.01;  // part of the bounding box's diagonal
@@ -142,6 +144,7 @@ void Viewer::show(const std::vector<PlacedDataset>& datasets, const MesoScene& s
     }
     camera_ = home_ = seen_ = camera;
     drawn_.reset();
+    hasSettled_ = false;
     drag_ = Drag::None;
     move_.reset();
     sectionDrag_.reset();
@@ -468,7 +471,9 @@ FrameRequest Viewer::requestWith(int reduction) const {
     request.height = uint32_t(std::max(1, size_.y / reduction));
     request.errorPixels = options_.errorPixels;
     request.shading = shading_;
-    if (isMoving(now_)) request.shading.occlusionRays = 0;
+    // The first pictures of a scene come without, as moving ones do, so that there is something to look at.
+    const bool isFirst = options_.framesAhead && isOpen_ && !hasSettled_;
+    if (isMoving(now_) || isFirst) request.shading.occlusionRays = 0;
     request.sections = sections_;
     request.sectionCaps = sectionCaps_;
     request.march = options_.march;
@@ -498,14 +503,20 @@ Result<NextStep> Viewer::update(double now) {
     seen_ = camera_;
     requestReduction_ = movingReduction_ = reductionAt(now);
     request_ = requestWith(requestReduction_);
+    status_.drawnPart = renderer_->finishedPart();
+    // Pages are taken in when the picture is finished: it is of those that were there when it was begun.
+    if (goesOnDrawing()) return NextStep{!renderer_->isBusy(), kStepPollSeconds};
     VCP_TRY_ASSIGN(auto update, renderer_->update(request_));
     pagesChanged_ = pagesChanged_ || update.changed;
     if (!update.problems.empty()) status_.problem = update.problems.back().line();
     status_.detail = detailOf(update, request_.errorPixels);
+    hasSettled_ = hasSettled_ || update.settled;
     status_.update = std::move(update);
     if (options_.framesAhead && renderer_->lastDone()) takeStats(*renderer_->lastDone());
     return nextStep(now);
 }
+
+bool Viewer::goesOnDrawing() const { return renderer_->isUnfinished() && request_ == begun_; }
 
 /// Whether the last update's request leaves something out because the camera moves.
 bool Viewer::isCheaper() const {
@@ -557,16 +568,32 @@ Result<bool> Viewer::drawSample() {
 }
 
 Result<bool> Viewer::draw() {
+    if (goesOnDrawing()) {
+        VCP_TRY_ASSIGN(const bool isLast, renderer_->continueFrame());
+        if (isLast) finishDraw();
+        pagesChanged_ = !isLast && !renderer_->isUnfinished();  // then it is begun anew
+        return isLast;
+    }
     if (addsSample_) return drawSample();
     if (options_.framesAhead) {
         const glm::dvec2 cursor = cursor_ * glm::dvec2(request_.width, request_.height) / glm::dvec2(size_);
         const bool isInside = cursor.x >= 0 && cursor.y >= 0 && cursor.x < request_.width && cursor.y < request_.height;
         const PicturePixel pixel{uint32_t(std::max(cursor.x, 0.0)), uint32_t(std::max(cursor.y, 0.0))};
         VCP_TRY(renderer_->renderAhead(request_, isInside ? std::optional(pixel) : std::nullopt));
+        begun_ = request_;
+        pagesChanged_ = false;
+        if (renderer_->isUnfinished()) return false;
     } else {
         VCP_TRY(renderer_->render(request_));
     }
+    finishDraw();
+    return true;
+}
+
+/// Notes that there is a new picture.
+void Viewer::finishDraw() {
     if (renderer_->lastDone()) takeStats(*renderer_->lastDone());
+    status_.drawnPart = 1;
     status_.reduction = requestReduction_;
     status_.samples = 1;
     const bool wantsLight =
@@ -576,7 +603,6 @@ Result<bool> Viewer::draw() {
     drawn_ = request_;
     drawnAt_ = now_;
     pagesChanged_ = false;
-    return true;
 }
 
 /// Takes a frame's statistics for the status, and for the size of frames while the camera moves.

@@ -93,6 +93,7 @@ struct ViewerStatus {
     UpdateResult update;
     Detail detail = Detail::Loading;
     FrameStats frame;      ///< statistics of the last draw(), or of the newest frame that has ended (framesAhead)
+    double drawnPart = 1;  ///< of the picture that is being drawn, 0 to 1; 1: none is
     int reduction = 1;     ///< the last picture has 1/reduction of the width and height
     uint32_t samples = 0;  ///< whole samples of the last picture
     std::string device;
@@ -241,6 +242,9 @@ private:
     [[nodiscard]] bool refinementIsDue(double now) const;
     [[nodiscard]] NextStep nextStep(double now);
     Result<bool> drawSample();
+    /// Whether the frame that was begun is still what is to be drawn.
+    [[nodiscard]] bool goesOnDrawing() const;
+    void finishDraw();
     [[nodiscard]] bool isCheaper() const;
     void takeStats(const DoneFrame& done);
     glm::dvec3 pointOfInterest(glm::dvec2 pixel);
@@ -284,6 +288,7 @@ private:
     FrameRequest request_;  ///< request of the last update
     int requestReduction_ = 1;
     std::optional<FrameRequest> drawn_;  ///< request of the last draw
+    FrameRequest begun_;                 ///< request of the frame that is drawn step by step
     OrbitCamera seen_;                   ///< the camera of the last update
     double movedAt_ = -std::numeric_limits<double>::infinity();
     double drawnAt_ = -std::numeric_limits<double>::infinity();
@@ -291,6 +296,7 @@ private:
     double fullFrameMs_ = 0;
     int movingReduction_ = 1;  // grows within a motion, never shrinks: a size that flickers is worse than a small one
     bool pagesChanged_ = false;
+    bool hasSettled_ = false;              // since a scene was opened
     bool addsSample_ = false;              // the next draw does
     uint32_t mostSamples_ = kMostSamples;  // that the device can add to a picture of this size
     uint64_t framesDrawn_ = 0;

@@ -265,6 +265,23 @@ void FrameResources::bind(VkCommandBuffer commands) const {
     vkCmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_COMPUTE, layout_, 0, 1, &set_, 0, nullptr);
 }
 
+void FrameResources::dispatchTiles(VkCommandBuffer commands, TileRange tiles) const {
+    const uint32_t row = tiles.first / frame::kTileRow, column = tiles.first % frame::kTileRow;
+    if (tiles.count == 0)
+        vkCmdDispatchIndirect(commands, tileList().handle(), 0);
+    else if (tiles.count < frame::kTileRow)
+        vkCmdDispatchBase(commands, column, row, 0, tiles.count, 1, 1);
+    else
+        vkCmdDispatchBase(commands, 0, row, 0, frame::kTileRow, tiles.count / frame::kTileRow, 1);
+}
+
+void FrameResources::recordListedTiles(VkCommandBuffer commands) const {
+    barrierComputeToReadback(commands);
+    const VkBufferCopy listed{kListedTilesWord * 4, offsetof(FrameCounts, listedTiles), 4};
+    vkCmdCopyBuffer(commands, tileList_.buffer.handle(), counted_.handle(), 1, &listed);
+    barrierTransferToHost(commands);
+}
+
 void FrameResources::recordReadback(VkCommandBuffer commands, const std::optional<PicturePixel>& cursor) const {
     const VkBufferCopy counters{0, offsetof(FrameCounts, counters), sizeof(frame::FrameCounters)};
     vkCmdCopyBuffer(commands, counters_.handle(), counted_.handle(), 1, &counters);

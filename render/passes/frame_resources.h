@@ -74,6 +74,12 @@ struct WordBuffer {
     TexelView view;
 };
 
+/// Tiles of the list that one dispatch works on.
+struct TileRange {
+    uint32_t first = 0;
+    uint32_t count = 0;  ///< 0: all there are; else whole rows of kTileRow tiles, or a part of one row
+};
+
 /// The words of one pixel's hit: the start distance of its tile, its depth and its normal.
 struct HitWords {
     uint32_t tileStart = 0, depth = 0, normal = 0;
@@ -118,11 +124,15 @@ public:
     void begin(VkCommandBuffer commands, const frame::FrameConstants& constants);
     /// Binds the set again, after passes with sets of their own.
     void bind(VkCommandBuffer commands) const;
+    /// Dispatches a workgroup for each listed tile of the range; beyond the list there is nothing.
+    void dispatchTiles(VkCommandBuffer commands, TileRange tiles) const;
 
     /// Records the copy of what a frame counted, and of the hit at `cursor`, to where counts() reads it. Comes after
     /// the last pass's barrierComputeToReadback; ends with barrierTransferToHost. Precondition: `cursor` is in the
     /// picture.
     void recordReadback(VkCommandBuffer commands, const std::optional<PicturePixel>& cursor) const;
+    /// Records the copy of the number of listed tiles alone, after the beam pass.
+    void recordListedTiles(VkCommandBuffer commands) const;
     /// Returns what recordReadback() copied. Precondition: the frame is done.
     [[nodiscard]] FrameCounts counts() const;
 

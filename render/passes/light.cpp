@@ -12,9 +12,9 @@ Result<void> LightPass::prepare(FrameResources& resources, const PassConstants& 
     return pipelines_.choose(resources, plain);
 }
 
-void LightPass::record(VkCommandBuffer commands, const FrameResources& resources) const {
+void LightPass::record(VkCommandBuffer commands, const FrameResources& resources, TileRange tiles) const {
     vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipelines_.current());
-    vkCmdDispatchIndirect(commands, resources.tileList().handle(), 0);
+    resources.dispatchTiles(commands, tiles);
     barrierComputeToCompute(commands);
 }
 

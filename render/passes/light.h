@@ -13,7 +13,7 @@ public:
     /// Makes the pipeline on first use. Errors: Device.
     Result<void> prepare(FrameResources& resources, const PassConstants& constants);
     /// Precondition: prepare().
-    void record(VkCommandBuffer commands, const FrameResources& resources) const;
+    void record(VkCommandBuffer commands, const FrameResources& resources, TileRange tiles) const;
     /// Forgets the pipelines, before pools with another layout come.
     void clear() { pipelines_.clear(); }
 

@@ -10,9 +10,9 @@ Result<void> TracePass::prepare(FrameResources& resources, const PassConstants& 
     return pipelines_.choose(resources, constants, {uint32_t(sections)});
 }
 
-void TracePass::record(VkCommandBuffer commands, const FrameResources& resources) const {
+void TracePass::record(VkCommandBuffer commands, const FrameResources& resources, TileRange tiles) const {
     vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipelines_.current());
-    vkCmdDispatchIndirect(commands, resources.tileList().handle(), 0);
+    resources.dispatchTiles(commands, tiles);
     barrierComputeToCompute(commands);
 }
 

@@ -16,7 +16,7 @@ public:
     /// Makes the variant's pipeline on first use. Errors: Device.
     Result<void> prepare(FrameResources& resources, const PassConstants& constants, SectionKind sections);
     /// Precondition: prepare().
-    void record(VkCommandBuffer commands, const FrameResources& resources) const;
+    void record(VkCommandBuffer commands, const FrameResources& resources, TileRange tiles) const;
     /// Forgets the pipelines, before pools with another layout come.
     void clear() { pipelines_.clear(); }
 

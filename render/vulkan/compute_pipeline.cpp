@@ -26,6 +26,7 @@ Result<ComputePipeline> ComputePipeline::create(const Device& device, VkPipeline
     info.stage.pName = "main";
     info.stage.pSpecializationInfo = &specialization;
     info.layout = layout;
+    info.flags = VK_PIPELINE_CREATE_DISPATCH_BASE_BIT;  // FrameResources::dispatchTiles
     ComputePipeline made;
     made.device_ = device.handle();
     const VkResult result =

@@ -112,6 +112,63 @@ TEST_F(FramesAhead, AMovingFrameWaitsForTheOneBeforeTheLastAtMost) {
     }
 }
 
+// On a software device a frame of many rays is drawn step by step: until the last one the picture before is shown, and
+// then there is the picture that is drawn at once.
+TEST_F(FramesAhead, AFrameThatTakesLongIsDrawnStepByStep) {
+    const Scene scene = test::sphereScene();
+    start({});
+    if (!renderer_->device().software) GTEST_SKIP() << "a GPU draws all at once";
+    show(scene);
+    FrameRequest request = around(scene, 1, 520, 440);
+    request.shading.shadows = true;
+    request.shading.occlusionRays = 8;
+    const FrameRequest other = around(scene, 5);
+    draw(request);
+    const Picture expected = *renderer_->readPicture();
+    const uint32_t hits = uint32_t(renderer_->lastDone()->stats.hitPixels);
+    draw(other);
+    const Picture before = *renderer_->readPicture();
+    update(request);
+    drawAhead(request);
+    ASSERT_TRUE(renderer_->isUnfinished());
+    int steps = 1;
+    for (double part = 0; renderer_->isUnfinished(); ++steps) {
+        EXPECT_GE(renderer_->finishedPart(), part);
+        part = renderer_->finishedPart();
+        EXPECT_EQ(*renderer_->readPicture(), before);
+        letEnd();
+        const auto isLast = renderer_->continueFrame();
+        ASSERT_TRUE(isLast) << isLast.error().line();
+        EXPECT_EQ(*isLast, !renderer_->isUnfinished());
+        update(request);
+        if (renderer_->isUnfinished()) {
+            EXPECT_EQ(renderer_->lastDone()->request.width, other.width) << "it is not taken in before it is finished";
+        }
+    }
+    EXPECT_GE(steps, 5);
+    EXPECT_EQ(renderer_->finishedPart(), 1);
+    EXPECT_EQ(*renderer_->readPicture(), expected);
+    update(request);
+    EXPECT_EQ(renderer_->lastDone()->stats.hitPixels, hits);
+
+    // What begins meanwhile ends it.
+    drawAhead(request);
+    ASSERT_TRUE(renderer_->isUnfinished());
+    update(other);
+    drawAhead(other);
+    EXPECT_FALSE(renderer_->isUnfinished());
+    EXPECT_EQ(*renderer_->readPicture(), before);
+    drawAhead(request);
+    ASSERT_TRUE(renderer_->isUnfinished());
+    draw(other);
+    EXPECT_FALSE(renderer_->isUnfinished());
+    EXPECT_EQ(*renderer_->readPicture(), before);
+    drawAhead(request);
+    show(scene);
+    EXPECT_FALSE(renderer_->isUnfinished()) << "another dataset";
+    for (const std::string& message : renderer_->validationMessages()) ADD_FAILURE() << message;
+}
+
 // Where the memory is mapped, an update that writes pages waits for the frames that may read them. Elsewhere its copies
 // wait on the device: one submission, and one more where the queue for copies must be told that frames have ended. It
 // waits only for the staging buffer of the update before the last.

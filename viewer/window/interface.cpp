@@ -1,111 +1,37 @@
 #include "viewer/window/interface.h"
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 
 #include <fmt/format.h>
 #include <imgui.h>
-#include <glm/common.hpp>
-#include <glm/geometric.hpp>
 
-#include "viewer/key_map.h"
 #include "viewer/scene/option_values.h"
-#include "viewer/scene/render_settings.h"
+#include "viewer/window/icons.h"
 
 namespace vcp {
 
 namespace {
 
-constexpr ImGuiWindowFlags kFixed = ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoCollapse |
-                                    ImGuiWindowFlags_NoSavedSettings;
-constexpr ImGuiWindowFlags kBare = kFixed | ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoScrollbar;
-// Values are dragged, not typed: keys belong to the window.
-constexpr ImGuiSliderFlags kNoTyping = ImGuiSliderFlags_NoInput | ImGuiSliderFlags_AlwaysClamp;
-constexpr ImGuiColorEditFlags kColour =
-    ImGuiColorEditFlags_NoInputs | ImGuiColorEditFlags_NoOptions | ImGuiColorEditFlags_Float;
-
-constexpr float kPanelWidth = 250, kMargin = 8;
-constexpr float kScaleBarLargest = 160;
-constexpr size_t kMostBoxes = 2000;
-constexpr double kUrgentDoublings = 5;  // doublings of the tolerated error, until a ray that asks is red
-constexpr ImU32 kInk = IM_COL32(255, 255, 255, 255), kShade = IM_COL32(0, 0, 0, 160),
-                kMeasured = IM_COL32(255, 210, 60, 255);
-constexpr ImU32 kHandle = IM_COL32(90, 190, 255, 255), kGripped = IM_COL32(255, 210, 60, 255);
-
-constexpr int kMostPictures = 3600;
-constexpr double kPicturesPerSecond = 30;
-
-constexpr const char* kPictureSizeNames[] = {"as shown",    "1920 x 1080",  "3840 x 2160",
-                                             "7680 x 4320", "16384 x 9216", "16384 x 16384"};
-constexpr glm::ivec2 kPictureSizes[] = {{0, 0},       {1920, 1080},  {3840, 2160},
-                                        {7680, 4320}, {16384, 9216}, {16384, 16384}};
-
-ImVec2 vec(glm::vec2 v) { return {v.x, v.y}; }
-
-void text(const std::string& line) { ImGui::TextUnformatted(line.data(), line.data() + line.size()); }
-
-void wrapped(const std::string& line) {
-    ImGui::PushTextWrapPos(0);
-    text(line);
-    ImGui::PopTextWrapPos();
-}
-
-/// Draws text on a dark ground: the picture behind may be as light as the text.
-void textAt(ImDrawList& list, glm::vec2 at, const std::string& line) {
-    const ImVec2 size = ImGui::CalcTextSize(line.data(), line.data() + line.size());
-    list.AddRectFilled({at.x - 3, at.y - 1}, {at.x + size.x + 3, at.y + size.y + 1}, kShade, 3);
-    list.AddText(vec(at), kInk, line.data(), line.data() + line.size());
-}
-
-/// Maps 0 to 1 from blue through green to red, as the false colours (shaders/shade.comp).
-ImU32 heatColour(float x, int alpha) {
-    const glm::vec3 c =
-        255.0f * glm::clamp(glm::vec3(3 * x - 1.2f, 1.5f - std::abs(3 * x - 1.2f), 1.4f - 3 * x), 0.0f, 1.0f);
-    return IM_COL32(int(c.x), int(c.y), int(c.z), alpha);
-}
-
-/// Draws the part of a line of the world that is before the eye.
-void drawSegment(ImDrawList& list, const Viewer& viewer, glm::dvec3 from, glm::dvec3 to, ImU32 colour, float width) {
-    const OrbitCamera& camera = viewer.camera();
-    const double near = 1e-3 * camera.focusDistance;
-    double a = camera.depthOf(from), b = camera.depthOf(to);
-    if (a < near && b < near) return;
-    if (a < near) from += (to - from) * ((near - a) / (b - a));
-    if (b < near) to = from + (to - from) * ((a - near) / (a - b));
-    const auto p = camera.pixelOf(from, viewer.size()), q = camera.pixelOf(to, viewer.size());
-    if (p && q) list.AddLine(vec(glm::vec2(*p)), vec(glm::vec2(*q)), colour, width);
-}
-
-/// Edits a colour: screens show colours encoded, the shading takes them linear.
-bool colourEdit(const char* label, glm::vec3& linear) {
-    float shown[3];
-    for (int i = 0; i < 3; ++i) shown[i] = std::pow(linear[i], 1 / 2.2f);
-    if (!ImGui::ColorEdit3(label, shown, kColour)) return false;
-    for (int i = 0; i < 3; ++i) linear[i] = std::pow(std::clamp(shown[i], 0.0f, 1.0f), 2.2f);
-    return true;
-}
-
-/// Returns the largest of 1, 2, 5 times a power of ten that is at most `most`.
-double roundLength(double most) {
-    const double power = std::pow(10.0, std::floor(std::log10(most)));
-    for (const double step : {5.0, 2.0})
-        if (step * power <= most) return step * power;
-    return power;
-}
-
-std::string shortened(const std::string& path, size_t most) {
-    return path.size() <= most ? path : "..." + path.substr(path.size() - most);
-}
+constexpr ImGuiWindowFlags kBar = ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoCollapse |
+                                  ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoTitleBar |
+                                  ImGuiWindowFlags_NoScrollbar | ImGuiWindowFlags_NoScrollWithMouse;
+constexpr float kToolbarHeight = 40, kStatusHeight = 24, kPanelWidth = 288, kNarrowest = 32;
+constexpr float kToastWidth = 400, kGap = 8;
 
 }  // namespace
 
-void Interface::layOut(glm::ivec2 framebuffer, float scale) {
+void Interface::layOut(glm::ivec2 framebuffer, const Look& look) {
     size_ = framebuffer;
-    scale_ = scale;
-    statusHeight_ = ImGui::GetFrameHeight();
-    panelWidth_ = session_->user().panel ? std::min(kPanelWidth * scale_, 0.5f * size_.x) : 0;
-    session_->viewer().setCovered({.right = panelWidth_, .bottom = statusHeight_});
-    if (session_->viewer().isOpen()) {
+    look_ = &look;
+    ImGui::PushFont(look.body);
+    toolbarHeight_ = units(kToolbarHeight);
+    statusHeight_ = units(kStatusHeight);
+    const bool isOpen = session_->viewer().isOpen();
+    panelWidth_ = session_->user().panel ? std::min(units(kPanelWidth), size_.x - units(kNarrowest)) : 0;
+    session_->viewer().setCovered({.right = panelWidth_, .top = toolbarHeight_, .bottom = statusHeight_});
+    if (isOpen) {
         if (session_->showsPages) drawPages();
         drawScaleBar();
         drawMeasured();
@@ -113,392 +39,332 @@ void Interface::layOut(glm::ivec2 framebuffer, float scale) {
         if (session_->showsFeedback()) drawFeedback();
         if (session_->user().panel) layOutPanel();
     } else if (!session_->opening()) {
-        layOutStart();
+        layOutWelcome();
     }
+    layOutToolbar();
     layOutStatus();
-    layOutMessages();
     if (session_->opening())
         layOutOpening();
     else if (const auto saving = session_->saving())
         layOutSaving(*saving);
-    if (showsHelp) layOutHelp();
+    layOutToasts();
+    if (page_ == Page::Help) layOutHelp();
+    if (page_ == Page::Files) layOutFiles();
+    ImGui::PopFont();
 }
 
-void Interface::layOutStatus() {
-    ImGui::SetNextWindowPos({0, size_.y - statusHeight_});
-    ImGui::SetNextWindowSize({size_.x, statusHeight_});
-    ImGui::PushStyleVar(ImGuiStyleVar_WindowPadding, ImVec2(kMargin * scale_, 3 * scale_));
-    ImGui::PushStyleVar(ImGuiStyleVar_WindowBorderSize, 0.0f);
-    ImGui::PushStyleVar(ImGuiStyleVar_WindowMinSize, ImVec2(1, 1));
-    ImGui::SetNextWindowBgAlpha(1);
-    ImGui::Begin("status", nullptr, kBare | ImGuiWindowFlags_NoBringToFrontOnFocus);
-    const Viewer& viewer = session_->viewer();
-    std::string line;
-    if (viewer.isFlying()) line += fmt::format("flying, speed {:.2g} | ", viewer.flySpeed());
-    if (session_->isMeasuring) line += session_->isPicking() ? "measuring ... | " : "measuring: click | ";
-    const std::string hint = "F1 keys  Tab panel";
-    const float room = size_.x - ImGui::CalcTextSize(hint.c_str()).x - 5 * kMargin * scale_;
-    const auto most = size_t(std::max(0.0f, room / ImGui::CalcTextSize("0").x));
-    text(line + statusLine(viewer.status(), most - std::min(most, line.size())));
-    ImGui::End();
-    ImGui::SetNextWindowPos({size_.x, size_.y - statusHeight_}, ImGuiCond_Always, {1, 0});
-    ImGui::SetNextWindowBgAlpha(1);
-    ImGui::Begin("hint", nullptr, kBare | ImGuiWindowFlags_AlwaysAutoResize);
-    text(hint);
+std::vector<Interface::Tool> Interface::tools() {
+    ViewSession* const session = session_;
+    const Viewer& viewer = session->viewer();
+    const auto acts = [session](ViewerAction action) { return [session, action] { session->act(action); }; };
+    const Shading& shading = viewer.shading();
+    return {
+        {icon::kFit, "Fit", {"Fit all into the window", "F"}, false, false, acts(ViewerAction::Fit)},
+        {icon::kHome, "Reset", {"Back to the view it opened with", "R"}, false, false, acts(ViewerAction::Reset)},
+        {},
+        {icon::kMeasure,
+         "Measure",
+         {"Measure: click points on the surface", "D"},
+         session->isMeasuring,
+         true,
+         [session] { session->isMeasuring = !session->isMeasuring; }},
+        {icon::kCut,
+         "Cut",
+         {"Cut open with a plane through the middle", "X"},
+         !viewer.sections().empty(),
+         true,
+         acts(ViewerAction::ToggleSection)},
+        {},
+        {icon::kShadows, "Shadows", {"Shadows", "S"}, shading.shadows, false, acts(ViewerAction::ToggleShadows)},
+        {icon::kOcclusion,
+         "Occlusion",
+         {"Ambient occlusion: corners are darker", "O"},
+         shading.occlusionRays > 0,
+         false,
+         acts(ViewerAction::ToggleOcclusion)},
+        {icon::kShading,
+         "Clay",
+         {"Colours of the scan, or clay", "C"},
+         shading.mode == ShadingMode::Clay,
+         false,
+         acts(ViewerAction::ToggleColour)},
+        {},
+        {icon::kFly,
+         "Fly",
+         {"Fly: W A S D, E up, Q down, drag to look", "G"},
+         viewer.isFlying(),
+         false,
+         acts(ViewerAction::ToggleFly)},
+        {icon::kPicture, "Save", {"Save the picture", "Ctrl+S"}, false, true, [this] { savePicture(); }},
+    };
+}
+
+void Interface::layOutTool(const Tool& tool, bool withLabel) {
+    if (!tool.icon) {
+        const ImVec2 at = ImGui::GetCursorScreenPos();
+        ImGui::Dummy({units(kGap), units(32)});
+        const float x = std::round(at.x + 0.5f * units(kGap)) + 0.5f;
+        ImGui::GetWindowDrawList()->AddLine({x, at.y + units(6)}, {x, at.y + units(26)}, look_->palette.line, units(1));
+        return;
+    }
+    if (!withLabel) {
+        if (iconButton(*look_, tool.icon, tool.label, tool.tip, tool.isOn)) tool.act();
+        return;
+    }
+    const std::string shown = std::string(tool.icon) + "  " + tool.label;
+    const Palette& palette = look_->palette;
+    ImGui::PushStyleColor(ImGuiCol_Button, tool.isOn ? palette.accent : palette.ground);
+    ImGui::PushStyleColor(ImGuiCol_ButtonHovered, tool.isOn ? palette.accent : palette.hovered);
+    ImGui::PushStyleColor(ImGuiCol_ButtonActive, tool.isOn ? palette.accent : palette.hovered);
+    ImGui::PushStyleColor(ImGuiCol_Text, tool.isOn ? palette.onAccent : palette.ink);
+    if (ImGui::Button(shown.c_str(), {0, units(32)})) tool.act();
+    ImGui::PopStyleColor(4);
+    showTip(*look_, tool.tip);
+}
+
+void Interface::layOutToolbar() {
+    ImGui::SetNextWindowPos({0, 0});
+    ImGui::SetNextWindowSize({size_.x, toolbarHeight_});
+    ImGui::PushStyleVar(ImGuiStyleVar_WindowPadding, ImVec2(units(4), units(4)));
+    ImGui::PushStyleVar(ImGuiStyleVar_WindowRounding, 0.0f);
+    ImGui::PushStyleVar(ImGuiStyleVar_ItemSpacing, ImVec2(units(4), 0));
+    ImGui::Begin("toolbar", nullptr, kBar | ImGuiWindowFlags_NoBringToFrontOnFocus);
+    ImGui::GetWindowDrawList()->AddLine({0, toolbarHeight_ - 0.5f}, {size_.x, toolbarHeight_ - 0.5f},
+                                        look_->palette.line, units(1));
+    if (iconButton(*look_, icon::kOpen, "open", {"Open a file, a recent one or the demo", "Ctrl+O"}))
+        ImGui::OpenPopup("open menu");
+    layOutOpenMenu();
+    const bool isOpen = session_->viewer().isOpen();
+    const std::vector<Tool> tools = isOpen ? this->tools() : std::vector<Tool>{};
+    const float side = units(36), right = 2 * side, room = size_.x - units(8) - side - right;
+    const auto widthOf = [&](const Tool& tool, bool withLabel) {
+        if (!tool.icon) return units(kGap + 4);
+        if (!withLabel || !tool.hasLabel) return side;
+        return ImGui::CalcTextSize(tool.icon).x + ImGui::CalcTextSize("  ").x + ImGui::CalcTextSize(tool.label).x +
+               units(20);
+    };
+    float wide = 0;
+    for (const Tool& tool : tools) wide += widthOf(tool, true);
+    const bool withLabels = wide <= room;
+    // What has no room goes under the dots, which need some themselves.
+    size_t shown = 0;
+    for (float used = 0; shown < tools.size(); ++shown) {
+        used += widthOf(tools[shown], withLabels);
+        if (used + (shown + 1 < tools.size() ? side : 0) > room && !withLabels) break;
+        ImGui::SameLine(0, units(4));
+        layOutTool(tools[shown], withLabels && tools[shown].hasLabel);
+    }
+    if (shown < tools.size()) {
+        ImGui::SameLine();
+        if (iconButton(*look_, icon::kMore, "more", {"More", ""})) ImGui::OpenPopup("more menu");
+        ImGui::PushStyleVar(ImGuiStyleVar_WindowPadding, ImVec2(units(8), units(8)));
+        if (ImGui::BeginPopup("more menu")) {
+            for (size_t i = shown; i < tools.size(); ++i)
+                if (tools[i].icon && ImGui::MenuItem((std::string(tools[i].icon) + "  " + tools[i].label).c_str(),
+                                                     tools[i].tip.keys, tools[i].isOn))
+                    tools[i].act();
+            ImGui::EndPopup();
+        }
+        ImGui::PopStyleVar();
+    }
+    ImGui::SameLine(size_.x - right);
+    if (iconButton(*look_, icon::kHelp, "help", {"Keys and mouse", "F1"}, page_ == Page::Help)) toggleHelp();
+    ImGui::SameLine();
+    if (iconButton(*look_, icon::kPanel, "panel", {"The panel: view, light, cut, measure, layers", "Tab"},
+                   isOpen && session_->user().panel))
+        session_->togglePanel();
     ImGui::End();
     ImGui::PopStyleVar(3);
 }
 
-void Interface::layOutMessages() {
-    const std::string problem = session_->problem();
-    const std::string& said = problem.empty() ? session_->note() : problem;
-    if (said.empty()) return;
-    ImGui::SetNextWindowPos({kMargin * scale_, kMargin * scale_});
-    ImGui::SetNextWindowSize(
-        {size_.x - (2 * kMargin + (session_->user().panel && session_->viewer().isOpen() ? kPanelWidth + kMargin : 0)) *
-                       scale_,
-         0});
-    ImGui::PushStyleColor(ImGuiCol_WindowBg,
-                          problem.empty() ? ImVec4(0.1f, 0.2f, 0.3f, 0.9f) : ImVec4(0.45f, 0.08f, 0.05f, 0.95f));
-    ImGui::Begin("message", nullptr, kBare);
-    if (!problem.empty()) {
-        if (ImGui::SmallButton("x")) session_->dismissProblem();
-        ImGui::SameLine();
+void Interface::layOutOpenMenu() {
+    ImGui::PushStyleVar(ImGuiStyleVar_WindowPadding, ImVec2(units(8), units(8)));
+    ImGui::PushStyleVar(ImGuiStyleVar_ItemSpacing, ImVec2(units(8), units(8)));
+    if (ImGui::BeginPopup("open menu")) {
+        if (ImGui::MenuItem((std::string(icon::kOpen) + "  Open a file" + "\u2026").c_str(), "Ctrl+O")) openFileList();
+        if (ImGui::MenuItem((std::string(icon::kDemo) + "  Open the demo").c_str())) openDemo();
+        // The list is copied, since opening a file changes it.
+        const std::vector<std::string> recent = session_->user().recent;
+        if (!recent.empty()) {
+            ImGui::Separator();
+            text(look_->small, look_->palette.dim, "Recent");
+        }
+        const float most = std::min(units(360), size_.x - units(48));
+        for (const std::string& file : recent) {
+            if (ImGui::MenuItem((fittedEnd(file, most) + "##" + file).c_str())) host_.open({file});
+            showTip(*look_, {file.c_str(), ""});
+        }
+        ImGui::EndPopup();
     }
-    wrapped(said);
+    ImGui::PopStyleVar(2);
+}
+
+/// What the picture is, as a person would say it.
+std::string Interface::stateText() const {
+    const ViewerStatus& status = session_->viewer().status();
+    const UpdateResult& update = status.update;
+    const std::string error = formatPixels(update.errorPixels) + " px";
+    // In steps of 5: each new text is a new picture of the window.
+    if (status.drawnPart < 1) return fmt::format("Drawing, {:.0f} %", 5 * std::floor(20 * status.drawnPart));
+    switch (status.detail) {
+        case Detail::Loading:
+            return update.pagesMissing > 0 ? fmt::format("Loading, {} parts to come", update.pagesMissing) : "Loading";
+        case Detail::Settled:
+            return update.drawable ? "Sharp" : "Ready";
+        case Detail::Finest:
+            return "All detail of the file is shown";
+        case Detail::Budget:
+            return fmt::format("Memory is full: sharp to {}", error);
+    }
+    return {};
+}
+
+void Interface::layOutStatus() {
+    const Viewer& viewer = session_->viewer();
+    const ViewerStatus& status = viewer.status();
+    const Palette& palette = look_->palette;
+    ImGui::SetNextWindowPos({0, size_.y - statusHeight_});
+    ImGui::SetNextWindowSize({size_.x, statusHeight_});
+    ImGui::PushStyleVar(ImGuiStyleVar_WindowPadding, ImVec2(units(8), units(5)));
+    ImGui::PushStyleVar(ImGuiStyleVar_WindowRounding, 0.0f);
+    ImGui::Begin("status", nullptr, kBar | ImGuiWindowFlags_NoBringToFrontOnFocus);
+    ImGui::PushFont(look_->small);
+    ImGui::GetWindowDrawList()->AddLine({0, size_.y - statusHeight_ + 0.5f}, {size_.x, size_.y - statusHeight_ + 0.5f},
+                                        palette.line, units(1));
+    // What is most important comes first: a narrow window has no room for the rest.
+    std::vector<std::pair<std::string, ImU32>> parts;
+    if (viewer.isFlying()) parts.emplace_back(fmt::format("Flying, speed {:.2g}", viewer.flySpeed()), palette.accent);
+    if (session_->isMeasuring)
+        parts.emplace_back(session_->isPicking() ? "Measuring\u2026" : "Click a point to measure", palette.accent);
+    if (viewer.isOpen()) {
+        parts.emplace_back(stateText(), status.detail == Detail::Budget ? palette.problem : palette.ink);
+        if (status.detail == Detail::Settled && status.update.drawable)
+            parts.emplace_back(fmt::format("Off by {} px at most", formatPixels(status.update.errorPixels)),
+                               palette.dim);
+        const uint32_t most = std::max(viewer.samples(), status.samples);
+        if (most > 1) parts.emplace_back(fmt::format("Samples {} of {}", status.samples, most), palette.dim);
+        if (status.reduction > 1)
+            parts.emplace_back(fmt::format("1/{} size while moving", status.reduction), palette.dim);
+        if (!status.without.empty()) parts.emplace_back(status.without, palette.dim);
+        if (status.levels > 0) parts.emplace_back(formatCount(status.triangles) + " triangles", palette.dim);
+        parts.emplace_back(status.name, palette.dim);
+    } else {
+        parts.emplace_back(session_->opening() ? "Opening" : "Nothing is open", palette.dim);
+    }
+    const float detailsWide = viewer.isOpen() ? ImGui::CalcTextSize("Details").x + units(16) : 0;
+    float room = size_.x - units(16) - detailsWide;
+    for (size_t i = 0; i < parts.size(); ++i) {
+        const std::string set = typeset(parts[i].first);
+        const float wide = ImGui::CalcTextSize(set.c_str()).x;
+        if (i > 0 && wide + units(24) > room) break;
+        if (i > 0) {
+            ImGui::SameLine(0, units(12));
+            text(look_->small, palette.line, "|");
+            ImGui::SameLine(0, units(12));
+        }
+        text(look_->small, parts[i].second, i > 0 ? set : fitted(set, room));
+        room -= wide + units(i > 0 ? 30 : 0);
+    }
+    if (viewer.isOpen()) {
+        const std::string label = "Details";
+        ImGui::SetCursorPos({size_.x - units(8) - ImGui::CalcTextSize(label.c_str()).x, units(5)});
+        const ImVec2 at = ImGui::GetCursorScreenPos();
+        if (ImGui::InvisibleButton("details", {ImGui::CalcTextSize(label.c_str()).x, units(14)}))
+            showsDetails_ = !showsDetails_;
+        ImGui::GetWindowDrawList()->AddText(at, ImGui::IsItemHovered() || showsDetails_ ? palette.accent : palette.dim,
+                                            label.c_str());
+        showTip(*look_, {"What the picture is made of, and what it costs", ""});
+    }
+    ImGui::PopFont();
+    ImGui::End();
+    ImGui::PopStyleVar(2);
+    if (!showsDetails_ || !viewer.isOpen()) return;
+    const float height = std::min(units(400), size_.y - toolbarHeight_ - statusHeight_ - units(16));
+    ImGui::SetNextWindowPos({size_.x - panelWidth_ - units(8), size_.y - statusHeight_ - units(8)}, ImGuiCond_Always,
+                            {1, 1});
+    ImGui::SetNextWindowSizeConstraints({std::min(units(280), size_.x - units(16)), 0},
+                                        {std::min(units(280), size_.x - units(16)), height});
+    ImGui::PushStyleColor(ImGuiCol_WindowBg, palette.raised);
+    ImGui::Begin("details card", nullptr,
+                 (kBar & ~(ImGuiWindowFlags_NoScrollbar | ImGuiWindowFlags_NoScrollWithMouse)) |
+                     ImGuiWindowFlags_AlwaysAutoResize);
+    layOutDetails();
     ImGui::End();
     ImGui::PopStyleColor();
 }
 
-void Interface::layOutPanel() {
-    ImGui::SetNextWindowPos({size_.x - panelWidth_, 0});
-    ImGui::SetNextWindowSize({panelWidth_, size_.y - statusHeight_});
-    ImGui::SetNextWindowBgAlpha(0.8f);
-    ImGui::Begin("panel", nullptr, kFixed | ImGuiWindowFlags_NoTitleBar);
-    ImGui::PushItemWidth(0.5f * panelWidth_);
-    if (ImGui::CollapsingHeader("View", ImGuiTreeNodeFlags_DefaultOpen)) layOutViews();
-    if (ImGui::CollapsingHeader("Look", ImGuiTreeNodeFlags_DefaultOpen)) layOutLooks();
-    if (ImGui::CollapsingHeader("Measure", ImGuiTreeNodeFlags_DefaultOpen)) layOutMeasuring();
-    if (ImGui::CollapsingHeader("Streaming", ImGuiTreeNodeFlags_DefaultOpen)) layOutLimits();
-    if (ImGui::CollapsingHeader("Picture")) layOutPicture();
-    if (ImGui::CollapsingHeader("Recent files")) layOutFiles();
-    ImGui::PopItemWidth();
-    ImGui::End();
-}
-
-void Interface::actionButton(const char* label, ViewerAction action) {
-    if (ImGui::Button(label)) session_->act(action);
-}
-
-void Interface::layOutViews() {
-    Viewer& viewer = session_->viewer();
-    actionButton("Fit", ViewerAction::Fit);
-    ImGui::SameLine();
-    actionButton("Reset", ViewerAction::Reset);
-    ImGui::SameLine();
-    actionButton(viewer.camera().projection == Projection::Perspective ? "Orthographic" : "Perspective",
-                 ViewerAction::ToggleProjection);
-    actionButton("Front", ViewerAction::ViewFront);
-    ImGui::SameLine();
-    actionButton("Right", ViewerAction::ViewRight);
-    ImGui::SameLine();
-    actionButton("Top", ViewerAction::ViewTop);
-    ImGui::SameLine();
-    actionButton("Iso", ViewerAction::ViewIsometric);
-    actionButton(viewer.camera().up == UpAxis::Y ? "Z up" : "Y up", ViewerAction::ToggleUpAxis);
-    ImGui::SameLine();
-    actionButton(viewer.isFlying() ? "Stop flying" : "Fly", ViewerAction::ToggleFly);
-    ImGui::SameLine();
-    if (ImGui::Button("Copy")) copyCamera();
-    ImGui::SameLine();
-    if (ImGui::Button("Paste")) pasteCamera();
-    text("Bookmarks");
-    const auto* kept = session_->bookmarks();
-    for (int number = 1; kept && number <= int(UserSettings::kMostBookmarks); ++number) {
-        if (!kept->contains(number)) continue;
+void Interface::layOutToasts() {
+    const float width = std::min(units(kToastWidth), size_.x - panelWidth_ - units(16));
+    if (width < units(32)) return;
+    float top = toolbarHeight_ + units(16);
+    const auto toast = [&](const char* name, const char* sign, ImU32 colour, const std::string& said) {
+        ImGui::SetNextWindowPos({0.5f * (size_.x - panelWidth_), top}, ImGuiCond_Always, {0.5f, 0});
+        ImGui::SetNextWindowSize({width, 0});
+        ImGui::PushStyleColor(ImGuiCol_WindowBg, look_->palette.raised);
+        ImGui::PushStyleColor(ImGuiCol_Border, colour);
+        ImGui::PushStyleVar(ImGuiStyleVar_WindowBorderSize, units(1));
+        ImGui::PushStyleVar(ImGuiStyleVar_WindowPadding, ImVec2(units(12), units(8)));
+        ImGui::Begin(name, nullptr, kBar | ImGuiWindowFlags_NoFocusOnAppearing);
+        ImGui::AlignTextToFramePadding();
+        text(look_->body, colour, sign);
         ImGui::SameLine();
-        if (ImGui::SmallButton(std::to_string(number).c_str())) session_->goToBookmark(number);
-    }
-    int free = 1;
-    while (kept && kept->contains(free)) ++free;
-    if (free > int(UserSettings::kMostBookmarks)) return;
-    ImGui::SameLine();
-    if (ImGui::SmallButton("+")) session_->keepBookmark(free);
-}
-
-void Interface::layOutLooks() {
-    Viewer& viewer = session_->viewer();
-    Shading shading = viewer.shading();
-    int mode = int(shading.mode);
-    if (ImGui::Combo("shading", &mode, kShadingNames.data(), int(kShadingNames.size())))
-        shading.mode = static_cast<ShadingMode>(mode);
-    // On files that are drawn without shadows, the switch does nothing.
-    ImGui::BeginDisabled(!viewer.whyWithout(ViewerAction::ToggleShadows).empty());
-    ImGui::Checkbox("shadows", &shading.shadows);
-    ImGui::SameLine();
-    bool occlusion = shading.occlusionRays > 0;
-    if (ImGui::Checkbox("occlusion", &occlusion)) shading.occlusionRays = occlusion ? kUsualOcclusionRays : 0;
-    ImGui::EndDisabled();
-    colourEdit("above", shading.backgroundTop);
-    ImGui::SameLine();
-    colourEdit("below", shading.backgroundBottom);
-    ImGui::SameLine();
-    ImGui::AlignTextToFramePadding();
-    text("background");
-    if (shading != viewer.shading()) viewer.setShading(shading);
-    bool follows = shading.lightFollowsCamera;
-    if (ImGui::Checkbox("light follows the camera", &follows)) session_->act(ViewerAction::ToggleLight);
-    bool section = !viewer.sections().empty();
-    if (ImGui::Checkbox("section", &section)) session_->act(ViewerAction::ToggleSection);
-}
-
-void Interface::layOutLimits() {
-    Viewer& viewer = session_->viewer();
-    const ViewerStatus& status = viewer.status();
-    auto error = float(viewer.errorPixels());
-    if (ImGui::SliderFloat("error, px", &error, 0.1f, 16.0f, "%.2f", kNoTyping | ImGuiSliderFlags_Logarithmic))
-        viewer.setErrorPixels(double(error));
-    const UpdateResult& update = status.update;
-    const char* const limit = status.detail == Detail::Budget   ? ": the budget is too small for less"
-                              : status.detail == Detail::Finest ? ": this is the finest level"
-                                                                : "";
-    wrapped(fmt::format("error now {} px{}", formatPixels(update.errorPixels), limit));
-    const float part = float(update.residentBytes) / float(std::max<uint64_t>(status.budgetBytes, 1));
-    const std::string filled =
-        fmt::format("{} of {}", formatBytes(update.residentBytes), formatBytes(status.budgetBytes));
-    ImGui::ProgressBar(part, ImVec2(-1, 0), filled.c_str());
-    uint64_t budget = status.budgetBytes;
-    if (ImGui::SmallButton("half the budget")) budget /= 2;
-    ImGui::SameLine();
-    if (ImGui::SmallButton("double")) budget *= 2;
-    if (budget != status.budgetBytes)
-        if (const auto set = viewer.setBudget(budget); !set) session_->say(set.error().line());
-    wrapped(fmt::format("{} subvolumes drawn, {} in memory", update.pagesInCut, update.pagesResident));
-    text(update.settled ? "settled" : fmt::format("loading, {} missing", update.pagesMissing));
-    text(fmt::format("{} read", formatBytes(update.bytesRead)));
-    ImGui::Checkbox("subvolumes", &session_->showsPages);
-    bool feedback = session_->showsFeedback();
-    if (ImGui::Checkbox("what rays ask for", &feedback)) session_->showFeedback(feedback);
-}
-
-void Interface::layOutMeasuring() {
-    ImGui::Checkbox("click measures", &session_->isMeasuring);
-    Measurement& measured = session_->measurement();
-    if (measured.empty()) return;
-    wrapped(measurementText(measured));
-    if (ImGui::Button("Copy text")) copyMeasurement();
-    ImGui::SameLine();
-    if (ImGui::Button("CSV, JSON")) session_->exportMeasurement();
-    ImGui::SameLine();
-    if (ImGui::Button("Clear")) measured.clear();
-}
-
-void Interface::layOutPicture() {
-    ImGui::Combo("size", &pictureSize_, kPictureSizeNames, int(std::size(kPictureSizeNames)));
-    ImGui::Checkbox("transparent", &picture_.transparent);
-    ImGui::SameLine();
-    ImGui::Checkbox("depth (.pfm)", &picture_.depth);
-    ImGui::BeginDisabled(session_->saving().has_value());
-    if (ImGui::Button("Save picture")) savePicture();
-    ImGui::SliderInt("pictures", &sequencePictures_, 2, kMostPictures, "%d", kNoTyping | ImGuiSliderFlags_Logarithmic);
-    if (ImGui::Button("Turntable")) saveTurntable();
-    ImGui::SameLine();
-    if (ImGui::Button("Through bookmarks")) savePath();
-    ImGui::EndDisabled();
-    wrapped(fmt::format("{:.1f} seconds at {} a second", sequencePictures_ / kPicturesPerSecond, kPicturesPerSecond));
-}
-
-void Interface::layOutSaving(const ViewSession::SavingProgress& saving) {
-    ImGui::SetNextWindowPos({0.5f * size_.x, size_.y - statusHeight_ - 2 * kMargin * scale_}, ImGuiCond_Always,
-                            {0.5f, 1});
-    ImGui::SetNextWindowSize({std::min(300 * scale_, size_.x), 0});
-    ImGui::Begin("saving", nullptr, kBare);
-    wrapped(saving.pictures > 1 ? fmt::format("{}: {} of {} pictures", saving.name, saving.finished, saving.pictures)
-                                : saving.name);
-    const std::string percent = fmt::format("{:.0f} %", 100 * saving.fraction);
-    ImGui::ProgressBar(float(saving.fraction), ImVec2(-1, 0), percent.c_str());
-    if (ImGui::Button("Cancel (Esc)")) session_->cancelSaving();
-    ImGui::End();
-}
-
-void Interface::layOutFiles() {
-    // The list is copied, since opening a file changes it.
-    const std::vector<std::string> recent = session_->user().recent;
-    for (const std::string& file : recent) {
-        if (ImGui::Selectable(shortened(file, 34).c_str())) session_->open({file});
-        if (ImGui::IsItemHovered()) ImGui::SetTooltip("%s", file.c_str());
-    }
-}
-
-void Interface::layOutStart() {
-    ImGui::SetNextWindowPos(vec(0.5f * size_), ImGuiCond_Always, {0.5f, 0.5f});
-    ImGui::Begin("start", nullptr, kBare | ImGuiWindowFlags_AlwaysAutoResize);
-    text("Drop a .vcp file or meshes here.");
-    const std::vector<std::string> recent = session_->user().recent;
-    if (!recent.empty()) {
-        ImGui::Separator();
-        text("Recent files");
-    }
-    for (const std::string& file : recent)
-        if (ImGui::Button(shortened(file, 60).c_str(), ImVec2(-1, 0))) session_->open({file});
-    ImGui::End();
-}
-
-void Interface::layOutOpening() {
-    SceneOpening& opening = *session_->opening();
-    const SceneOpening::Progress progress = opening.progress();
-    ImGui::SetNextWindowPos(vec(0.5f * size_), ImGuiCond_Always, {0.5f, 0.5f});
-    ImGui::SetNextWindowSize({std::min(360 * scale_, size_.x), 0});
-    ImGui::Begin("opening", nullptr, kBare);
-    wrapped(nameOf(opening.inputs()) + (progress.stage.empty() ? ": opening" : ": " + progress.stage));
-    const std::string percent = fmt::format("{:.0f} %", 100 * progress.fraction);
-    ImGui::ProgressBar(float(progress.fraction), ImVec2(-1, 0), percent.c_str());
-    if (progress.triangles > 0) text(formatCount(progress.triangles) + " triangles");
-    if (ImGui::Button("Cancel (Esc)")) opening.cancel();
-    ImGui::End();
-}
-
-void Interface::layOutHelp() {
-    ImGui::SetNextWindowPos(vec(0.5f * size_), ImGuiCond_Always, {0.5f, 0.5f});
-    ImGui::SetNextWindowBgAlpha(0.97f);
-    ImGui::SetNextWindowFocus();
-    ImGui::Begin("keys", nullptr, kBare | ImGuiWindowFlags_AlwaysAutoResize);
-    text(keyMapText());
-    ImGui::End();
-}
-
-void Interface::drawScaleBar() const {
-    const Viewer& viewer = session_->viewer();
-    const double unitsPerPixel = viewer.camera().viewHeight() / std::max(1, viewer.size().y);
-    const double length = roundLength(double(kScaleBarLargest * scale_) * unitsPerPixel);
-    const auto pixels = float(length / unitsPerPixel);
-    if (!std::isfinite(pixels)) return;
-    ImDrawList& list = *ImGui::GetBackgroundDrawList();
-    const glm::vec2 from(2 * kMargin * scale_, size_.y - statusHeight_ - 2 * kMargin * scale_);
-    for (const auto& [colour, width] : {std::pair(kShade, 4 * scale_), std::pair(kInk, 2 * scale_)}) {
-        list.AddLine(vec(from), {from.x + pixels, from.y}, colour, width);
-        for (const float x : {from.x, from.x + pixels})
-            list.AddLine({x, from.y - 4 * scale_}, {x, from.y + 4 * scale_}, colour, width);
-    }
-    const bool everywhere = viewer.camera().projection == Projection::Orthographic;
-    textAt(list, from + glm::vec2(0, -20 * scale_), formatLength(length) + (everywhere ? "" : " in the middle"));
-}
-
-void Interface::drawMeasured() const {
-    ImDrawList& list = *ImGui::GetBackgroundDrawList();
-    const Viewer& viewer = session_->viewer();
-    const auto pixelOf = [&](const MeasuredPoint& p) { return viewer.camera().pixelOf(p.position, viewer.size()); };
-    for (const MeasuredLine& line : session_->measurement().lines())
-        for (size_t i = 0; i < line.size(); ++i) {
-            const auto at = pixelOf(line[i]);
-            if (!at) continue;
-            const glm::vec2 here(*at);
-            list.AddCircleFilled(vec(here), 5 * scale_, kShade);
-            list.AddCircleFilled(vec(here), 3.5f * scale_, kMeasured);
-            if (i + 1 == line.size()) continue;
-            const auto next = pixelOf(line[i + 1]);
-            if (!next) continue;
-            const glm::vec2 there(*next);
-            list.AddLine(vec(here), vec(there), kMeasured, 2 * scale_);
-            textAt(list, 0.5f * (here + there) + glm::vec2(6 * scale_, 0), formatLength(segmentLength(line, i)));
+        const bool isProblem = sign == icon::kProblem;
+        ImGui::PushTextWrapPos(width - units(isProblem ? 44 : 12));
+        ImGui::AlignTextToFramePadding();
+        text(typeset(said));
+        ImGui::PopTextWrapPos();
+        if (isProblem) {
+            ImGui::SetCursorPos({width - units(36), units(8)});
+            if (iconButton(*look_, icon::kClose, "dismiss", {"Dismiss", ""}, false, 24)) session_->dismissProblem();
         }
+        top += ImGui::GetWindowSize().y + units(8);
+        ImGui::End();
+        ImGui::PopStyleVar(2);
+        ImGui::PopStyleColor(2);
+    };
+    if (const std::string problem = session_->problem(); !problem.empty())
+        toast("problem", icon::kProblem, look_->palette.problem, problem);
+    std::string note = session_->note();
+    if (note.empty()) return;
+    note.front() = char(std::toupper(uint8_t(note.front())));
+    toast("note", icon::kDetails, look_->palette.accent, note);
 }
 
-void Interface::drawSectionHandles() const {
-    ImDrawList& list = *ImGui::GetBackgroundDrawList();
-    const SectionGrab grab = session_->viewer().sectionGrab();
-    for (const SectionHandle& handle : session_->viewer().sectionHandles()) {
-        const auto colourOf = [&](SectionGrip part) {
-            return grab == SectionGrab{part, handle.plane} ? kGripped : kHandle;
-        };
-        std::vector<ImVec2> ring;
-        for (const glm::dvec2 at : handle.ring) ring.push_back(vec(glm::vec2(at)));
-        list.AddPolyline(ring.data(), int(ring.size()), kShade, ImDrawFlags_Closed, 5 * scale_);
-        list.AddPolyline(ring.data(), int(ring.size()), colourOf(SectionGrip::Turn), ImDrawFlags_Closed, 2.5f * scale_);
-        const glm::vec2 foot(handle.foot), tip(handle.tip);
-        const ImU32 colour = colourOf(SectionGrip::Move);
-        list.AddCircleFilled(vec(foot), 8 * scale_, kShade);
-        list.AddCircleFilled(vec(foot), 6.5f * scale_, colour);
-        if (handle.isAlongView) continue;
-        const glm::vec2 along = glm::normalize(tip - foot), across(-along.y, along.x);
-        const glm::vec2 neck = tip - 12 * scale_ * along;
-        list.AddLine(vec(foot), vec(neck), kShade, 5 * scale_);
-        list.AddLine(vec(foot), vec(neck), colour, 3 * scale_);
-        list.AddTriangleFilled(vec(tip), vec(neck + 6 * scale_ * across), vec(neck - 6 * scale_ * across), colour);
-    }
+void Interface::toggleHelp() {
+    page_ = page_ == Page::Help ? Page::None : Page::Help;
+    typed_.clear();
 }
 
-void Interface::drawPages() const {
-    ImDrawList& list = *ImGui::GetBackgroundDrawList();
-    Viewer& viewer = session_->viewer();
-    const std::vector<PageBox> pages = viewer.renderer().residentPages();
-    const float finest = float(std::max(1u, viewer.status().levels - 1));
-    size_t drawn = 0;
-    for (const PageBox& page : pages) {
-        if (!page.isDrawn || ++drawn > kMostBoxes) continue;
-        const ImU32 colour = heatColour(float(page.level) / finest, 150);
-        for (int axis = 0; axis < 3; ++axis)
-            for (int side = 0; side < 4; ++side) {
-                const glm::dvec3 from = page.corner + page.edges[size_t(axis + 1) % 3] * double(side & 1) +
-                                        page.edges[size_t(axis + 2) % 3] * double(side >> 1);
-                drawSegment(list, viewer, from, from + page.edges[size_t(axis)], colour, scale_);
-            }
-    }
-    const std::string said =
-        fmt::format("{} of {} subvolumes in memory are drawn{}",
-                    std::count_if(pages.begin(), pages.end(), [](const PageBox& p) { return p.isDrawn; }), pages.size(),
-                    drawn > kMostBoxes ? fmt::format("; the first {} as boxes", kMostBoxes) : "");
-    textAt(list, {2 * kMargin * scale_, size_.y - statusHeight_ - 52 * scale_}, said);
+void Interface::openFileList() {
+    page_ = Page::Files;
+    typed_.clear();
+    files_.read(files_.folder().empty() ? std::filesystem::path(".") : files_.folder());
 }
 
-void Interface::drawFeedback() const {
-    ImDrawList& list = *ImGui::GetBackgroundDrawList();
-    Viewer& viewer = session_->viewer();
-    const auto& kept = viewer.renderer().feedbackPicture();
-    const float cell = 8 * scale_;
-    const glm::vec2 size(FeedbackPicture::kWidth * cell, FeedbackPicture::kHeight * cell);
-    const glm::vec2 corner(2 * kMargin * scale_, 5 * kMargin * scale_);
-    list.AddRectFilled(vec(corner - 4 * scale_), vec(corner + size + glm::vec2(4 * scale_, 22 * scale_)), kShade);
-    size_t asking = 0;
-    const double tolerated = viewer.errorPixels();
-    for (uint32_t i = 0; kept && i < kept->errorPixels.size(); ++i) {
-        const double error = kept->errorPixels[i];
-        if (error < 0) continue;
-        const bool asks = error > tolerated;
-        asking += asks ? 1 : 0;
-        const glm::vec2 at = corner + cell * glm::vec2(i % FeedbackPicture::kWidth, i / FeedbackPicture::kWidth);
-        // Green where the page is fine enough, yellow to red where a finer one is asked for.
-        const auto urgency = float(asks ? std::min(std::log2(error / tolerated) / kUrgentDoublings, 1.0) : 0);
-        const ImU32 colour = asks ? IM_COL32(255, int(210 * (1 - urgency)), 40, 255) : IM_COL32(70, 150, 90, 255);
-        list.AddRectFilled(vec(at), vec(at + cell - scale_), colour);
-    }
-    const std::string said =
-        kept ? fmt::format("{} of {} rays asked", asking, kept->errorPixels.size()) : "nothing is missing";
-    textAt(list, corner + glm::vec2(0, size.y + 3 * scale_), said);
+void Interface::type(uint32_t codepoint) {
+    if (codepoint < 0x20 || codepoint == 0x7f || codepoint > 0xffff) return;
+    char utf8[4];
+    const int bytes = codepoint < 0x80 ? 1 : codepoint < 0x800 ? 2 : 3;
+    utf8[0] = char(bytes == 1 ? codepoint : bytes == 2 ? 0xc0 | codepoint >> 6 : 0xe0 | codepoint >> 12);
+    for (int i = 1; i < bytes; ++i) utf8[i] = char(0x80 | (codepoint >> (6 * (bytes - 1 - i)) & 0x3f));
+    typed_.append(utf8, size_t(bytes));
+}
+
+void Interface::eraseTyped() {
+    while (!typed_.empty() && (uint8_t(typed_.back()) & 0xc0) == 0x80) typed_.pop_back();
+    if (!typed_.empty()) typed_.pop_back();
 }
 
 void Interface::copyCamera() {
     host_.copyText(cameraToJson(session_->viewer().camera()));
-    session_->note("camera copied");
+    session_->note("Camera copied");
 }
 
 void Interface::pasteCamera() { session_->pasteCamera(host_.pasteText()); }
 
 void Interface::copyMeasurement() {
     host_.copyText(measurementText(session_->measurement()));
-    session_->note("measurement copied");
+    session_->note("Measurement copied");
 }
-
-PictureChoice Interface::pictureChosen() const {
-    PictureChoice choice = picture_;
-    choice.size = pictureSize_ == 0 ? session_->viewer().size() : kPictureSizes[pictureSize_];
-    return choice;
-}
-
-void Interface::savePicture() { session_->savePicture(pictureChosen()); }
-
-void Interface::saveTurntable() { session_->saveTurntable(pictureChosen(), sequencePictures_); }
-
-void Interface::savePath() { session_->savePath(pictureChosen(), sequencePictures_); }
 
 }  // namespace vcp

@@ -1,15 +1,24 @@
-// The panels over the picture: status line, problem line, panel, keyboard map, scale bar, measured lines, start screen
-// and progress, laid out with Dear ImGui. A click acts on the session at once.
+// The panels over the picture: toolbar, status bar, panel, toasts, welcome page, file list, keys, scale bar, measured
+// lines, progress; laid out with Dear ImGui. A click acts on the session at once.
 //
-// Used between InterfacePainter::begin and end, in the same thread.
+// interface.cpp has the bars and toasts, interface_panel.cpp the panel, interface_pages.cpp what covers the picture for
+// a while, interface_overlays.cpp what is drawn over it. Used between InterfacePainter::begin and end, in the same
+// thread.
 #pragma once
 
 #include <functional>
+#include <map>
+#include <span>
 #include <string>
+#include <vector>
 
 #include <glm/vec2.hpp>
 
+#include "viewer/window/controls.h"
+#include "viewer/window/file_list.h"
 #include "viewer/window/view_session.h"
+
+struct ImDrawList;
 
 namespace vcp {
 
@@ -17,16 +26,28 @@ namespace vcp {
 struct InterfaceHost {
     std::function<void(const std::string&)> copyText;
     std::function<std::string()> pasteText;
+    std::function<void(std::vector<std::string>)> open;
+    /// Numbers of the recent files' thumbnails in Look::pictures, by what the files are remembered as.
+    std::map<std::string, size_t> thumbnails;
 };
 
 class Interface {
 public:
     Interface(ViewSession& session, InterfaceHost host) : session_(&session), host_(std::move(host)) {}
 
-    bool showsHelp = false;
+    /// Lays everything out and tells the viewer what it covers.
+    void layOut(glm::ivec2 framebuffer, const Look& look);
 
-    /// Lays everything out and tells the viewer what it covers. `scale`: pixels of the display per unit of the layout.
-    void layOut(glm::ivec2 framebuffer, float scale);
+    /// Pages over the picture, which take what is typed.
+    void toggleHelp();
+    void openFileList();
+    [[nodiscard]] bool takesText() const { return page_ != Page::None; }
+    /// Closes the page. Precondition: takesText().
+    void closePage() { page_ = Page::None; }
+    void type(uint32_t codepoint);
+    void eraseTyped();
+    /// Opens what is first in the file list.
+    void enterTyped();
 
     /// Copies the camera, or, with text on the clipboard, goes to the camera it describes.
     void copyCamera();
@@ -38,33 +59,74 @@ public:
     void savePath();
 
 private:
+    enum class Page { None, Help, Files };
+    struct Tool {
+        const char *icon, *label;
+        Tip tip;
+        bool isOn;
+        bool hasLabel;  ///< its label is shown where there is room
+        std::function<void()> act;
+    };
+
+    void layOutToolbar();
+    [[nodiscard]] std::vector<Tool> tools();
+    void layOutTool(const Tool& tool, bool withLabel);
+    void layOutOpenMenu();
     void layOutStatus();
-    void layOutMessages();
+    [[nodiscard]] std::string stateText() const;
+    void layOutToasts();
+
     void layOutPanel();
-    void layOutViews();
-    void layOutLooks();
-    void layOutLimits();
+    void layOutView();
+    void layOutBookmarks();
+    void layOutLight();
+    void layOutCut();
     void layOutMeasuring();
-    void layOutFiles();
-    void layOutPicture();
-    void layOutSaving(const ViewSession::SavingProgress& saving);
-    [[nodiscard]] PictureChoice pictureChosen() const;
+    void layOutMeasuredLine(size_t number);
+    void layOutLayers();
+    void layOutSave();
+    void layOutDetails();
+    void layOutLimits();
+
+    /// A card over the dimmed window, with a field that shows what is typed, and what `layOutRest` adds.
+    void layOutPage(const char* title, const char* hint, float width, float height, void (Interface::*layOutRest)());
     void layOutHelp();
-    void layOutStart();
+    void layOutKeys();
+    void layOutFiles();
+    void layOutFolder();
+    void enter(const FileList::Entry& entry);
+    void layOutWelcome();
+    void layOutRecent(float width, size_t columns);
     void layOutOpening();
+    void layOutSaving(const ViewSession::SavingProgress& saving);
+    /// Begins a card in the middle of the window, at most so many units wide and high; 0: as high as its contents.
+    bool beginCard(const char* name, float width, float height);
+    /// Ends it, and what beginCard() set.
+    void endCard();
+
     void drawScaleBar() const;
     void drawMeasured() const;
     void drawSectionHandles() const;
     void drawPages() const;
     void drawFeedback() const;
-    void actionButton(const char* label, ViewerAction action);
+    /// Draws text on a plate: the picture behind may be as light or dark as the text.
+    void plateAt(ImDrawList& list, glm::vec2 at, const std::string& line) const;
+
+    void openDemo();
+    void actionButton(const char* label, ViewerAction action, const Tip& tip, float width = 0);
+    [[nodiscard]] PictureChoice pictureChosen() const;
+    [[nodiscard]] float units(float n) const { return look_->units(n); }
 
     ViewSession* session_;
     InterfaceHost host_;
+    const Look* look_ = nullptr;
     glm::vec2 size_{0};
-    float scale_ = 1;
-    float statusHeight_ = 0, panelWidth_ = 0;
-    int pictureSize_ = 0;  // index in kPictureSizes
+    float toolbarHeight_ = 0, statusHeight_ = 0, panelWidth_ = 0;
+    Page page_ = Page::None;
+    std::string typed_;
+    FileList files_;
+    bool showsDetails_ = false;  // opened by the status bar
+    int pictureSize_ = 0;        // index in kPictureSizes
     PictureChoice picture_;
     int sequencePictures_ = 120;
 };

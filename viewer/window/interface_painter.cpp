@@ -9,12 +9,18 @@
 
 #include "octree/io/content_hash.h"
 #include "render/vulkan/check.h"
+#include "viewer/window/fonts.h"
 
 namespace vcp {
 
 namespace {
 
-constexpr float kFontPixels = 13;
+// Heights of lines, in units of the layout: letters are 0.83 of it.
+constexpr float kBodyHeight = 16, kSmallHeight = 14, kTitleHeight = 32, kIconHeight = 16, kTitleIconHeight = 28;
+// Icons stand on their own baseline: so far below that of letters are they centred in a line.
+constexpr float kIconDrop = 1.5f;
+// From here on letters are large enough without samples between pixels.
+constexpr float kSharpScale = 2;
 // The backend cycles through so many vertex buffers. Of the pictures that are presented, two are in flight at most.
 constexpr uint32_t kBuffers = 2;
 constexpr uint32_t kMostDescriptors = 8;
@@ -37,8 +43,9 @@ uint64_t hashOf(const ImDrawData& drawing) {
 
 }  // namespace
 
-Result<std::unique_ptr<InterfacePainter>> InterfacePainter::create(const WindowDrawing& window, float scale) {
-    std::unique_ptr<InterfacePainter> painter(new InterfacePainter(window));
+Result<std::unique_ptr<InterfacePainter>> InterfacePainter::create(const WindowDrawing& window, const Options& options,
+                                                                   std::vector<Picture> pictures) {
+    std::unique_ptr<InterfacePainter> painter(new InterfacePainter(window, std::move(pictures)));
     ImGui::CreateContext();
     ImGui::GetIO().IniFilename = nullptr;
     const VkDescriptorPoolSize samplers{VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER, kMostDescriptors};
@@ -48,7 +55,7 @@ Result<std::unique_ptr<InterfacePainter>> InterfacePainter::create(const WindowD
     info.poolSizeCount = 1;
     info.pPoolSizes = &samplers;
     VCP_VK(vkCreateDescriptorPool, window.device, &info, nullptr, &painter->descriptors_);
-    VCP_TRY(painter->setScale(scale));
+    VCP_TRY(painter->setOptions(options));
     return painter;
 }
 
@@ -58,19 +65,62 @@ InterfacePainter::~InterfacePainter() {
     ImGui::DestroyContext();
 }
 
-Result<void> InterfacePainter::setScale(float scale) {
+Result<void> InterfacePainter::setOptions(const Options& options) {
+    const Options before = std::exchange(options_, options);
+    if (started_ && before == options) return {};
+    look_.palette = paletteOf(options.isDark);
+    applyPalette(look_.palette, options.scale);
+    if (started_ && before.scale == options.scale) return {};
     stop();
-    // The built-in font is a bitmap: only whole multiples of its size are sharp.
-    scale_ = std::clamp(std::round(scale), 1.0f, 8.0f);
-    ImGui::GetStyle() = ImGuiStyle();
-    ImGui::StyleColorsDark();
-    ImGui::GetStyle().ScaleAllSizes(scale_);
-    ImFontConfig config;
-    config.SizePixels = kFontPixels * scale_;
-    ImFontAtlas& fonts = *ImGui::GetIO().Fonts;
-    fonts.Clear();
-    fonts.AddFontDefault(&config);
+    look_.scale = options.scale;
+    makeFonts();
     return start();
+}
+
+/// Fills the fonts' texture: letters, icons, and the pictures.
+void InterfacePainter::makeFonts() {
+    // Ranges of characters; Dear ImGui reads them when it makes the texture.
+    static constexpr ImWchar kAll[] = {0x20, 0x17f, 0x2009, 0x2265, 0, 0};
+    static constexpr ImWchar kWestern[] = {0x20, 0xff, 0x2009, 0x2265, 0, 0};
+    static constexpr ImWchar kIconRange[] = {0xf000, 0xf700, 0};
+    ImFontAtlas& atlas = *ImGui::GetIO().Fonts;
+    atlas.Clear();
+    atlas.Flags |= ImFontAtlasFlags_NoPowerOfTwoHeight;
+    const auto add = [&](std::span<const unsigned char> file, float height, const ImWchar* ranges, float drop,
+                         bool isMerged) {
+        ImFontConfig config;
+        config.FontDataOwnedByAtlas = false;
+        config.MergeMode = isMerged;
+        config.PixelSnapH = true;
+        config.OversampleH = look_.scale < kSharpScale ? 2 : 1;
+        config.GlyphOffset.y = std::round(drop * look_.scale);
+        // The atlas only reads what it does not own.
+        return atlas.AddFontFromMemoryTTF(const_cast<unsigned char*>(file.data()), int(file.size()),
+                                          std::round(height * look_.scale), &config, ranges);
+    };
+    const auto withIcons = [&](ImFont* font, float height) {
+        add(kIcons, height, kIconRange, kIconDrop * height / kIconHeight, true);
+        return font;
+    };
+    look_.body = withIcons(add(kInterRegular, kBodyHeight, kAll, 0, false), kIconHeight);
+    look_.strong = withIcons(add(kInterSemibold, kBodyHeight, kAll, 0, false), kIconHeight);
+    look_.small = add(kInterRegular, kSmallHeight, kWestern, 0, false);
+    look_.title = withIcons(add(kInterSemibold, kTitleHeight, kWestern, 0, false), kTitleIconHeight);
+    std::vector<int> places;
+    for (const Picture& picture : pictures_)
+        places.push_back(atlas.AddCustomRectRegular(int(picture.width), int(picture.height)));
+    unsigned char* texels = nullptr;
+    int width = 0, height = 0;
+    atlas.GetTexDataAsRGBA32(&texels, &width, &height);
+    look_.pictures.clear();
+    for (size_t i = 0; i < pictures_.size(); ++i) {
+        const ImFontAtlasCustomRect& place = *atlas.GetCustomRectByIndex(places[i]);
+        const size_t row = size_t{pictures_[i].width} * 4;
+        for (size_t y = 0; y < pictures_[i].height; ++y)
+            std::copy_n(&pictures_[i].rgba[y * row], row,
+                        texels + (size_t{place.Y} + y) * size_t(width) * 4 + size_t{place.X} * 4);
+        atlas.CalcCustomRectUV(&place, &look_.pictures.emplace_back().from, &look_.pictures.back().to);
+    }
 }
 
 Result<void> InterfacePainter::start() {

@@ -1,4 +1,4 @@
-// Dear ImGui over the window's picture: context, font, and its own Vulkan backend (imgui_impl_vulkan).
+// Dear ImGui over the window's picture: context, fonts, theme, and its own Vulkan backend (imgui_impl_vulkan).
 //
 //   painter->begin(framebufferSize);  // then ImGui calls
 //   if (painter->end() || ...) renderer.present(width, height, painter->drawOver());
@@ -9,11 +9,14 @@
 
 #include <cstdint>
 #include <memory>
+#include <vector>
 
 #include <glm/vec2.hpp>
 
 #include "octree/io/result.h"
+#include "render/picture.h"
 #include "render/renderer.h"
+#include "viewer/window/theme.h"
 
 struct ImDrawData;
 
@@ -21,15 +24,23 @@ namespace vcp {
 
 class InterfacePainter {
 public:
-    /// `scale` 1 is a 13 pixel font; a high-density display asks for 2. Errors: Device.
-    static Result<std::unique_ptr<InterfacePainter>> create(const WindowDrawing& window, float scale);
+    /// How panels look. `scale`: pixels per unit of the layout; a high-density display asks for 2.
+    struct Options {
+        float scale = 1;
+        bool isDark = true;
+        bool operator==(const Options&) const = default;
+    };
+
+    /// `pictures` can be drawn by the panels (Look::pictures). Errors: Device.
+    static Result<std::unique_ptr<InterfacePainter>> create(const WindowDrawing& window, const Options& options,
+                                                            std::vector<Picture> pictures = {});
     ~InterfacePainter();
     InterfacePainter(const InterfacePainter&) = delete;
     InterfacePainter& operator=(const InterfacePainter&) = delete;
 
-    /// Sets the scale, between frames. Errors: Device.
-    Result<void> setScale(float scale);
-    [[nodiscard]] float scale() const { return scale_; }
+    /// Sets how panels look, between frames. Errors: Device.
+    Result<void> setOptions(const Options& options);
+    [[nodiscard]] const Look& look() const { return look_; }
 
     void begin(glm::ivec2 framebuffer);
     /// Ends the layout. Returns true when it looks other than the frame before.
@@ -38,14 +49,18 @@ public:
     [[nodiscard]] DrawOver drawOver();
 
 private:
-    explicit InterfacePainter(const WindowDrawing& window) : window_(window) {}
+    InterfacePainter(const WindowDrawing& window, std::vector<Picture> pictures)
+        : window_(window), pictures_(std::move(pictures)) {}
     Result<void> start();
     void stop();
+    void makeFonts();
     Result<void> uploadFont();
 
     WindowDrawing window_;
     VkDescriptorPool descriptors_ = VK_NULL_HANDLE;
-    float scale_ = 1;
+    std::vector<Picture> pictures_;
+    Options options_;
+    Look look_;
     bool started_ = false;
     uint64_t shown_ = 0;
 };

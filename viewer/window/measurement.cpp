@@ -102,6 +102,26 @@ void Measurement::takeBack() {
     if (lines_.back().empty()) lines_.pop_back();
 }
 
+std::vector<MeasuredText> measuredTexts(const MeasuredLine& line) {
+    std::vector<MeasuredText> texts;
+    const auto length = [](double value, double error) {
+        return fmt::format("{} +-{:.2g}", rounded(value, error), error);
+    };
+    for (size_t i = 0; i < line.size(); ++i) {
+        const MeasuredPoint& p = line[i];
+        texts.push_back({fmt::format("Point {} +-{:.2g}", i + 1, p.error),
+                         fmt::format("{}  {}  {}", rounded(p.position.x, p.error), rounded(p.position.y, p.error),
+                                     rounded(p.position.z, p.error))});
+        if (i > 0)
+            texts.push_back({fmt::format("Distance {} to {}", i, i + 1),
+                             length(segmentLength(line, i - 1), segmentError(line, i - 1))});
+        if (hasAngle(line, i))
+            texts.push_back({fmt::format("Angle at {}", i + 1), fmt::format("{:.2f}°", angleAt(line, i))});
+    }
+    if (line.size() > 2) texts.push_back({"Length", length(lineLength(line), lineError(line))});
+    return texts;
+}
+
 std::string measurementText(const Measurement& measurement) {
     std::string text;
     for (size_t i = 0; i < measurement.lines().size(); ++i) text += textOf(measurement.lines()[i], i + 1);

@@ -49,6 +49,13 @@ private:
     bool lineIsOpen_ = false;
 };
 
+/// A line as a panel lists it: what is measured, and its value to the digits that the error leaves.
+struct MeasuredText {
+    std::string what;   ///< "Point 1 +-0.00058", "Distance 1 to 2", "Angle at 2", "Length"
+    std::string value;  ///< coordinates, a length with its error, an angle
+};
+std::vector<MeasuredText> measuredTexts(const MeasuredLine& line);
+
 /// Returns the text for a person: coordinates to the digits that the error leaves.
 std::string measurementText(const Measurement& measurement);
 

@@ -32,6 +32,7 @@ using Json = nlohmann::ordered_json;
 
 constexpr size_t kLargestFile = 1 << 20;
 constexpr int kMostDamaged = 100;
+constexpr const char* kThemeNames[] = {"system", "light", "dark"};
 // The tries take half a minute.
 constexpr int kLockTries = 3000;
 constexpr std::chrono::milliseconds kLockPause{10};
@@ -51,12 +52,14 @@ public:
         const double read = field->get<double>();
         if (read >= least && read <= most) value = static_cast<Number>(read);
     }
-    void colour(const char* name, glm::vec3& value) const {
+    /// Returns whether it is there.
+    bool colour(const char* name, glm::vec3& value) const {
         const Json* field = find(name);
-        if (!field || !field->is_array() || field->size() != 3) return;
+        if (!field || !field->is_array() || field->size() != 3) return false;
         for (const Json& part : *field)
-            if (!part.is_number() || !(part.get<double>() >= 0 && part.get<double>() <= 1)) return;
+            if (!part.is_number() || !(part.get<double>() >= 0 && part.get<double>() <= 1)) return false;
         for (int i = 0; i < 3; ++i) value[i] = (*field)[size_t(i)].get<float>();
+        return true;
     }
     [[nodiscard]] const Json* find(const char* name) const {
         const auto at = json_.find(name);
@@ -90,13 +93,16 @@ UserSettings settingsFrom(const Json& json) {
     fields.number("width", settings.windowSize.x, 64, 16384);
     fields.number("height", settings.windowSize.y, 64, 16384);
     fields.flag("panel", settings.panel);
+    for (int i = 0; i < int(std::size(kThemeNames)); ++i)
+        if (const Json* theme = fields.find("theme"); theme && *theme == kThemeNames[i])
+            settings.theme = static_cast<ThemeChoice>(i);
     if (const Json* up = fields.find("up"); up && *up == "z") settings.up = UpAxis::Z;
     fields.flag("shadows", settings.shadows);
     fields.flag("occlusion", settings.occlusion);
     fields.number("error_pixels", settings.errorPixels, 0.01, 1000);
     fields.number("budget_bytes", settings.budgetBytes, 1 << 20, std::ldexp(1.0, 60));
-    fields.colour("background_top", settings.backgroundTop);
-    fields.colour("background_bottom", settings.backgroundBottom);
+    const bool hasTop = fields.colour("background_top", settings.backgroundTop);
+    settings.hasBackground = fields.colour("background_bottom", settings.backgroundBottom) || hasTop;
     return settings;
 }
 
@@ -138,6 +144,7 @@ void applyChanges(const SettingsChanges& changes, Json& json) {
         json["height"] = changes.windowSize->y;
     }
     put("panel", changes.panel);
+    if (changes.theme) json["theme"] = kThemeNames[size_t(*changes.theme)];
     if (changes.up) json["up"] = *changes.up == UpAxis::Z ? "z" : "y";
     put("shadows", changes.shadows);
     put("occlusion", changes.occlusion);
@@ -250,7 +257,7 @@ void UserSettings::remember(const std::string& name) {
 }
 
 bool SettingsChanges::empty() const {
-    return opened.empty() && bookmarks.empty() && !windowSize && !panel && !shadows && !occlusion && !up &&
+    return opened.empty() && bookmarks.empty() && !windowSize && !panel && !theme && !shadows && !occlusion && !up &&
            !errorPixels && !budgetBytes && !backgroundTop && !backgroundBottom;
 }
 

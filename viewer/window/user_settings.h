@@ -18,6 +18,8 @@
 
 namespace vcp {
 
+enum class ThemeChoice { System, Light, Dark };
+
 struct UserSettings {
     static constexpr size_t kMostRecent = 12;
     static constexpr size_t kMostBookmarks = 9;
@@ -27,10 +29,12 @@ struct UserSettings {
     std::map<std::string, std::map<int, OrbitCamera>> bookmarks;  ///< for each path or address; numbers 1 to 9
     glm::ivec2 windowSize{1280, 800};
     bool panel = false;
+    ThemeChoice theme = ThemeChoice::System;
     UpAxis up = UpAxis::Y;
     bool shadows = false, occlusion = false;
     double errorPixels = 0.5;
     uint64_t budgetBytes = 512ull << 20;
+    bool hasBackground = false;                    ///< the background was chosen by hand; else the theme has one
     glm::vec3 backgroundTop{0.10f, 0.12f, 0.15f};  ///< linear
     glm::vec3 backgroundBottom{0.25f, 0.27f, 0.30f};
 
@@ -44,6 +48,7 @@ struct SettingsChanges {
     std::map<std::string, std::map<int, OrbitCamera>> bookmarks;  ///< bookmarks that were kept: UserSettings::bookmarks
     std::optional<glm::ivec2> windowSize;
     std::optional<bool> panel, shadows, occlusion;
+    std::optional<ThemeChoice> theme;
     std::optional<UpAxis> up;
     std::optional<double> errorPixels;
     std::optional<uint64_t> budgetBytes;

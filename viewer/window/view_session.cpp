@@ -1,7 +1,9 @@
 #include "viewer/window/view_session.h"
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
+#include <limits>
 #include <utility>
 
 #include <fmt/format.h>
@@ -9,6 +11,8 @@
 
 #include "octree/io/output_file.h"
 #include "viewer/camera/camera_path.h"
+#include "viewer/window/theme.h"
+#include "viewer/window/thumbnails.h"
 
 namespace vcp {
 
@@ -17,6 +21,7 @@ namespace {
 // The seconds between looks at the work of other threads.
 constexpr double kOpeningPollSeconds = 0.1;
 constexpr double kPickPollSeconds = 0.01;
+constexpr double kNoteSeconds = 8;
 
 constexpr int kMostExports = 10000;
 constexpr uint32_t kSavedTile = 512;  // small, so that the window stays live between tiles
@@ -68,7 +73,10 @@ Result<std::unique_ptr<ViewSession>> ViewSession::create(const SessionOptions& o
 }
 
 ViewSession::ViewSession(const SessionOptions& options, std::unique_ptr<Viewer> viewer)
-    : options_(options), user_(options.user), viewer_(std::move(viewer)), seenLooks_(looks()), up_(options.render.up) {}
+    : options_(options), user_(options.user), viewer_(std::move(viewer)), seenLooks_(looks()), up_(options.render.up) {
+    note("");
+    useThemesBackground();
+}
 
 ViewSession::~ViewSession() {
     cancelSaving();
@@ -141,6 +149,14 @@ Result<void> ViewSession::show(const OpenedScene& open, const std::vector<std::s
     for (const OpenedScene::Part& part : open.parts) finest_->add(part.open.reader, *part.open.dataset, part.placement);
     VCP_TRY(viewer_->open(open.placed(), open.surfaces, camera, nameOf(inputs)));
     if (!open.surfaces.warnings.empty()) note(open.surfaces.warnings.front());
+    layers_.clear();
+    for (size_t i = 0; i < open.parts.size(); ++i) {
+        // What a mesh was built into is called as the mesh.
+        const bool isNamed = open.parts.size() > 1 && i < open.file.datasets.size();
+        layers_.push_back({isNamed ? nameOf({open.file.datasets[i].file}) : nameOf(inputs),
+                           open.parts[i].open.dataset->header.triangles});
+    }
+    for (const MesoSurfaceDescription& surface : open.file.surfaces) layers_.push_back({nameOf({surface.base}), 0});
     shown_ = rememberedName(inputs.front());
     for (const std::string& input : inputs) {
         changes_.opened.push_back(rememberedName(input));
@@ -158,6 +174,12 @@ Result<NextStep> ViewSession::update(double now) {
     viewer_->setSamples(saving_ || opening_ ? 1 : options_.samples);
     auto next = viewer_->update(now);
     if (!next) return next;
+    if (!note_.empty()) {
+        if (std::isnan(notedAt_)) notedAt_ = now;
+        const double left = notedAt_ + kNoteSeconds - now;
+        if (left <= 0) note("");
+        next->waitSeconds = std::min(next->waitSeconds, std::max(left, 0.0));
+    }
     if (opening_) next->waitSeconds = std::min(next->waitSeconds, kOpeningPollSeconds);
     if (saving_) next->waitSeconds = saving_->pictures->isWaiting() ? std::min(next->waitSeconds, kPickPollSeconds) : 0;
     if (pick_.valid()) next->waitSeconds = std::min(next->waitSeconds, kPickPollSeconds);
@@ -170,6 +192,25 @@ void ViewSession::act(ViewerAction action) {
         changes_.up = up_ = viewer_->camera().up == UpAxis::Y ? UpAxis::Z : UpAxis::Y;
     viewer_->act(action);
     if (const std::string why = viewer_->whyWithout(action); !why.empty()) note(why);
+}
+
+void ViewSession::note(std::string text) {
+    note_ = std::move(text);
+    notedAt_ = std::numeric_limits<double>::quiet_NaN();
+}
+
+void ViewSession::keepThumbnail() {
+    if (shown_.empty() || !viewer_->isOpen() || !viewer_->status().update.drawable || viewer_->framesDrawn() == 0)
+        return;
+    const auto picture = viewer_->renderer().readPicture();
+    if (!picture || picture->rgba.empty()) return;
+    const double part = double(picture->width) / std::max(1, viewer_->size().x);
+    const PictureMargins& covered = viewer_->covered();
+    const auto thumbnails = Thumbnails::inCache();
+    if (!thumbnails) return;
+    // A cache that cannot be written is no reason to trouble anyone.
+    (void)thumbnails->keep(shown_, thumbnailOf(*picture, {covered.left * part, covered.right * part, covered.top * part,
+                                                          covered.bottom * part}));
 }
 
 void ViewSession::showFeedback(bool show) {
@@ -346,6 +387,23 @@ const SettingsChanges& ViewSession::changes() {
 void ViewSession::togglePanel() {
     user_.panel = !user_.panel;
     changes_.panel = user_.panel;
+}
+
+void ViewSession::setTheme(ThemeChoice theme) {
+    user_.theme = theme;
+    changes_.theme = theme;
+    noteChanges();
+    useThemesBackground();
+}
+
+void ViewSession::useThemesBackground() {
+    if (user_.hasBackground || changes_.backgroundTop || changes_.backgroundBottom) return;
+    const Background background = backgroundOf(isDark(user_.theme));
+    Shading shading = viewer_->shading();
+    shading.backgroundTop = background.top;
+    shading.backgroundBottom = background.bottom;
+    viewer_->setShading(shading);
+    seenLooks_ = looks();
 }
 
 ViewSession::Looks ViewSession::looks() const {

@@ -61,6 +61,8 @@ public:
     /// Returns what was changed by hand, to be saved when the window closes.
     [[nodiscard]] const SettingsChanges& changes();
     void togglePanel();
+    /// Chooses the theme; the background goes with it where none was chosen by hand.
+    void setTheme(ThemeChoice theme);
     /// Keeps a size that was set by hand, not by the window system.
     void keepWindowSize(glm::ivec2 size) { changes_.windowSize = size; }
 
@@ -79,9 +81,21 @@ public:
     [[nodiscard]] std::string problem() const;
     void say(std::string problem) { problem_ = std::move(problem); }
     void dismissProblem();
-    /// Returns a word about what was done ("copied"); it goes at the next press of a key or button.
+    /// Returns a word about what was done ("copied"); it goes at the next press of a key or button, and after some
+    /// seconds.
     [[nodiscard]] const std::string& note() const { return note_; }
-    void note(std::string text) { note_ = std::move(text); }
+    void note(std::string text);
+
+    /// What is shown, part by part.
+    struct Layer {
+        std::string name;
+        uint64_t triangles = 0;  ///< 0: a surface with mesostructure
+    };
+    [[nodiscard]] const std::vector<Layer>& layers() const { return layers_; }
+
+    /// Keeps a thumbnail of what is shown, for the welcome page. Waits for the picture. Does nothing where nothing is
+    /// shown; where it cannot be kept, there is none.
+    void keepThumbnail();
 
     void keepBookmark(int number);
     void goToBookmark(int number);
@@ -135,6 +149,7 @@ private:
     ViewSession(const SessionOptions& options, std::unique_ptr<Viewer> viewer);
     [[nodiscard]] Looks looks() const;
     void noteChanges();
+    void useThemesBackground();
     void takeOpened();
     Result<void> show(const OpenedScene& open, const std::vector<std::string>& inputs);
     void takePicked();
@@ -155,6 +170,8 @@ private:
     std::string shown_;  // rememberedName of what is shown; empty: nothing
     bool wasShown_ = false, showsFeedback_ = false, hasSceneLight_ = false;
     std::string problem_, note_;
+    double notedAt_;  // time of the update that saw the note first; not a number until then
+    std::vector<Layer> layers_;
     Measurement measurement_;
     std::shared_ptr<ScenePick> finest_;
     std::future<Picked> pick_;

@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <cmath>
+#include <map>
 #include <utility>
 
 #define GLFW_INCLUDE_NONE
@@ -12,6 +13,7 @@
 #include "viewer/key_map.h"
 #include "viewer/window/interface.h"
 #include "viewer/window/interface_painter.h"
+#include "viewer/window/thumbnails.h"
 
 namespace vcp {
 
@@ -90,12 +92,12 @@ private:
 class ViewWindow {
 public:
     ViewWindow(const WindowSystem& system, ViewSession& session, std::unique_ptr<InterfacePainter> painter,
-               const WindowOptions& options)
+               std::map<std::string, size_t> thumbnails, const WindowOptions& options)
         : system_(&system),
           window_(system.window()),
           session_(&session),
           painter_(std::move(painter)),
-          interface_(session, host()),
+          interface_(session, host(std::move(thumbnails))),
           options_(&options) {
         session.viewer().renderer().onDeviceLoss([this] { painter_.reset(); });
         glfwSetWindowUserPointer(window_, this);
@@ -107,9 +109,10 @@ public:
         glfwSetScrollCallback(window_, [](GLFWwindow* w, double, double steps) { of(w).scroll(steps); });
         glfwSetKeyCallback(window_,
                            [](GLFWwindow* w, int key, int, int action, int mods) { of(w).key(key, action, mods); });
+        glfwSetCharCallback(window_, [](GLFWwindow* w, unsigned codepoint) { of(w).type(codepoint); });
         glfwSetWindowFocusCallback(window_, [](GLFWwindow* w, int) { of(w).letGo(); });
         glfwSetDropCallback(window_, [](GLFWwindow* w, int count, const char** paths) {
-            of(w).session_->open({paths, paths + count});
+            of(w).open({paths, paths + count});
         });
         glfwSetWindowContentScaleCallback(window_, [](GLFWwindow* w, float, float) { of(w).isRescaled_ = true; });
         int width = 0, height = 0;
@@ -163,30 +166,43 @@ public:
         report.problem = session_->problem();
         if (const glm::ivec2 size = system_->size(); shownSize && size != *shownSize) session_->keepWindowSize(size);
         report.changes = session_->changes();
+        session_->keepThumbnail();
         return report;
     }
 
 private:
     static ViewWindow& of(GLFWwindow* window) { return *static_cast<ViewWindow*>(glfwGetWindowUserPointer(window)); }
 
-    InterfaceHost host() {
+    InterfaceHost host(std::map<std::string, size_t> thumbnails) {
         return {[this](const std::string& text) { glfwSetClipboardString(window_, text.c_str()); },
                 [this] {
                     const char* text = glfwGetClipboardString(window_);
                     return std::string(text ? text : "");
-                }};
+                },
+                [this](std::vector<std::string> files) { open(std::move(files)); }, std::move(thumbnails)};
+    }
+
+    void open(std::vector<std::string> files) {
+        session_->keepThumbnail();
+        session_->open(std::move(files));
+    }
+
+    /// How panels look in the window as it is.
+    [[nodiscard]] InterfacePainter::Options painterOptions() const {
+        return {layoutScale(system_->contentScale(), framebuffer_.x, framebuffer_.y), isDark(session_->user().theme)};
     }
 
     /// Makes the painter anew, on the device that replaces a lost one.
     Result<void> makePainter() {
         VCP_TRY_ASSIGN(const auto drawing, session_->viewer().renderer().windowDrawing());
-        VCP_TRY_ASSIGN(painter_, InterfacePainter::create(drawing, system_->contentScale()));
+        VCP_TRY_ASSIGN(painter_, InterfacePainter::create(drawing, painterOptions()));
         mustPresent_ = true;
         return {};
     }
 
     void resize(glm::ivec2 size) {
         framebuffer_ = size;
+        isRescaled_ = true;
         session_->viewer().resize(size);
         mustPresent_ = true;
     }
@@ -202,8 +218,8 @@ private:
     void layOut() {
         if (framebuffer_.x == 0 || framebuffer_.y == 0) return;
         painter_->begin(framebuffer_);
-        session_->viewer().showSectionHandles(double(painter_->scale()));
-        interface_.layOut(framebuffer_, painter_->scale());
+        session_->viewer().showSectionHandles(double(painter_->look().scale));
+        interface_.layOut(framebuffer_, painter_->look());
         mustPresent_ = painter_->end() || mustPresent_;
     }
 
@@ -270,14 +286,18 @@ private:
     }
 
     void key(int key, int action, int mods) {
-        if (action == GLFW_REPEAT) return;
+        if (action == GLFW_REPEAT && !interface_.takesText()) return;
         const bool mayFly = (mods & GLFW_MOD_CONTROL) == 0 && (session_->viewer().isFlying() || action == GLFW_RELEASE);
         if (mayFly && holdFlyKey(held_, uint32_t(key), action == GLFW_PRESS)) {
             session_->viewer().fly(session_->viewer().isFlying() ? held_ : glm::dvec3(0));
             return;
         }
-        if (action != GLFW_PRESS) return;
+        if (action == GLFW_RELEASE) return;
         session_->note("");
+        if (interface_.takesText()) {
+            pageKey(key, mods);
+            return layOut();
+        }
         const bool isDigit = key >= GLFW_KEY_1 && key <= GLFW_KEY_9;
         if (isDigit && (mods & GLFW_MOD_CONTROL) != 0)
             session_->keepBookmark(key - GLFW_KEY_0);
@@ -289,7 +309,23 @@ private:
             plainKey(key);
     }
 
+    void type(uint32_t codepoint) {
+        if (!interface_.takesText()) return;
+        interface_.type(codepoint);
+        layOut();
+    }
+
+    /// A page that takes text has the keys; what they type comes to type().
+    void pageKey(int key, int mods) {
+        if (key == GLFW_KEY_ESCAPE) interface_.closePage();
+        if (key == GLFW_KEY_F1) interface_.toggleHelp();
+        if (key == GLFW_KEY_BACKSPACE) interface_.eraseTyped();
+        if (key == GLFW_KEY_ENTER) interface_.enterTyped();
+        if (key == GLFW_KEY_Q && (mods & GLFW_MOD_CONTROL) != 0) glfwSetWindowShouldClose(window_, GLFW_TRUE);
+    }
+
     void controlKey(int key) {
+        if (key == GLFW_KEY_O) interface_.openFileList();
         if (key == GLFW_KEY_C) interface_.copyCamera();
         if (key == GLFW_KEY_V) interface_.pasteCamera();
         if (key == GLFW_KEY_E) session_->exportMeasurement();
@@ -305,7 +341,7 @@ private:
                 escape();
                 break;
             case GLFW_KEY_F1:
-                interface_.showsHelp = !interface_.showsHelp;
+                interface_.toggleHelp();
                 break;
             case GLFW_KEY_TAB:
                 togglePanel();
@@ -349,9 +385,7 @@ private:
 
     void escape() {
         if (session_->viewer().cancelSectionDrag()) return;
-        if (interface_.showsHelp)
-            interface_.showsHelp = false;
-        else if (session_->opening())
+        if (session_->opening())
             session_->opening()->cancel();
         else if (session_->saving())
             session_->cancelSaving();
@@ -365,9 +399,13 @@ private:
 
     /// Shows the last picture and the panels when either is new or the window was uncovered.
     Result<void> present(bool drawn) {
-        if (std::exchange(isRescaled_, false)) VCP_TRY(painter_->setScale(system_->contentScale()));
+        if (std::exchange(isRescaled_, false) || themeShown_ != session_->user().theme) {
+            themeShown_ = session_->user().theme;
+            VCP_TRY(painter_->setOptions(painterOptions()));
+        }
         layOut();
-        if (session_->viewer().framesDrawn() == 0 || framebuffer_.x == 0 || framebuffer_.y == 0) return {};
+        const bool hasPicture = session_->viewer().framesDrawn() > 0 || session_->viewer().renderer().isUnfinished();
+        if (!hasPicture || framebuffer_.x == 0 || framebuffer_.y == 0) return {};
         if (!drawn && !mustPresent_) return {};
         mustPresent_ = false;
         return session_->viewer().renderer().present(uint32_t(framebuffer_.x), uint32_t(framebuffer_.y),
@@ -400,6 +438,7 @@ private:
     bool isClick_ = false, isDragging_ = false;
     glm::dvec3 held_{0};
     bool mustPresent_ = true, isRescaled_ = false;
+    ThemeChoice themeShown_ = ThemeChoice::System;
 };
 
 }  // namespace
@@ -413,8 +452,19 @@ Result<WindowReport> showWindow(const WindowOptions& options) {
     VCP_TRY_ASSIGN(auto session, ViewSession::create(options.session, system.surfaceSource()));
     session->open(inputs);
     VCP_TRY_ASSIGN(const auto drawing, session->viewer().renderer().windowDrawing());
-    VCP_TRY_ASSIGN(auto painter, InterfacePainter::create(drawing, system.contentScale()));
-    return ViewWindow(system, *session, std::move(painter), options).run(start);
+    // Only the welcome page shows thumbnails.
+    std::map<std::string, size_t> thumbnails;
+    std::vector<Picture> pictures;
+    const auto kept = inputs.empty() ? Thumbnails::inCache() : Result<Thumbnails>(Error::cancelled());
+    for (const std::string& file : kept ? session->user().recent : std::vector<std::string>{})
+        if (auto picture = kept->read(file)) {
+            thumbnails[file] = pictures.size();
+            pictures.push_back(*std::move(picture));
+        }
+    const InterfacePainter::Options look{layoutScale(system.contentScale(), 1 << 14, 1 << 14),
+                                         isDark(session->user().theme)};
+    VCP_TRY_ASSIGN(auto painter, InterfacePainter::create(drawing, look, std::move(pictures)));
+    return ViewWindow(system, *session, std::move(painter), std::move(thumbnails), options).run(start);
 }
 
 }  // namespace vcp

@@ -27,6 +27,17 @@ TEST(Measurement, LengthsErrorsAndAngles) {
     EXPECT_DOUBLE_EQ(angleAt(line, 1), 90);
 }
 
+TEST(Measurement, ALineIsListedRowByRow) {
+    std::vector<std::string> rows;
+    for (const MeasuredText& row : measuredTexts(rightAngle().lines().at(0)))
+        rows.push_back(row.what + " = " + row.value);
+    EXPECT_EQ(rows, (std::vector<std::string>{"Point 1 +-0.001 = 450003.0000  5200000.0000  100.0000",
+                                              "Point 2 +-0.002 = 450000.0000  5200000.0000  100.0000",
+                                              "Distance 1 to 2 = 3.0000 +-0.003", "Angle at 2 = 90.00°",
+                                              "Point 3 +-0.004 = 450000.0000  5200000.0000  104.0000",
+                                              "Distance 2 to 3 = 4.0000 +-0.006", "Length = 7.0000 +-0.009"}));
+}
+
 TEST(Measurement, SmallAndFlatAnglesKeepTheirDigits) {
     for (const double angle : {1e-7, 1e-3, 1.0, 3.1415}) {
         const MeasuredLine line{{{1, 0, 0}}, {{0, 0, 0}}, {{std::cos(angle), std::sin(angle), 0}}};

@@ -47,6 +47,7 @@ TEST_F(UserSettingsTest, ComeBackAsTheyWere) {
     settings.opened = {"http://example.org/a.vcp", "/tmp/b.ply"};
     settings.windowSize = {700, 500};
     settings.panel = settings.shadows = settings.occlusion = true;
+    settings.theme = ThemeChoice::Light;
     settings.up = UpAxis::Z;
     settings.errorPixels = 2.5;
     settings.budgetBytes = 3ull << 30;
@@ -63,6 +64,8 @@ TEST_F(UserSettingsTest, ComeBackAsTheyWere) {
     EXPECT_EQ(read->recent, (std::vector<std::string>{"/tmp/b.ply", "http://example.org/a.vcp"}));
     EXPECT_EQ(read->windowSize, settings.windowSize);
     EXPECT_TRUE(read->panel);
+    EXPECT_EQ(read->theme, ThemeChoice::Light);
+    EXPECT_TRUE(read->hasBackground);
     EXPECT_EQ(read->up, UpAxis::Z);
     EXPECT_TRUE(read->shadows && read->occlusion);
     EXPECT_EQ(read->errorPixels, 2.5);
@@ -83,7 +86,7 @@ TEST_F(UserSettingsTest, AFileThatIsNotThereGivesTheDefaults) {
 
 TEST_F(UserSettingsTest, WhatIsWrongIsLeftOut) {
     write(
-        R"({"recent":[1,"a",null,"b"],"width":"wide","height":1e99,"panel":3,"up":7,"error_pixels":-1,"budget_bytes":1e300,
+        R"({"recent":[1,"a",null,"b"],"width":"wide","height":1e99,"panel":3,"theme":"pink","up":7,"error_pixels":-1,"budget_bytes":1e300,
               "background_top":[0,0],"background_bottom":[0,2,0],"shadows":true,
               "bookmarks":{"x":{"1":{"position":[0,0,0]},"2":5,"99":{}},"y":3}})");
     const auto read = readUserSettings(file_);
@@ -95,6 +98,8 @@ TEST_F(UserSettingsTest, WhatIsWrongIsLeftOut) {
     EXPECT_EQ(read->budgetBytes, defaults.budgetBytes);
     EXPECT_EQ(read->backgroundTop, defaults.backgroundTop);
     EXPECT_EQ(read->backgroundBottom, defaults.backgroundBottom);
+    EXPECT_FALSE(read->hasBackground);
+    EXPECT_EQ(read->theme, defaults.theme);
     EXPECT_TRUE(read->shadows);
     EXPECT_TRUE(read->bookmarks.empty());
 }

@@ -228,6 +228,50 @@ TEST_F(RememberingSessionTest, WhatHandsChangeIsRememberedAlsoAfterOptions) {
     EXPECT_EQ(second.session->changes().shadows, std::nullopt) << "what is remembered is not changed";
 }
 
+TEST_F(RememberingSessionTest, TheBackgroundGoesWithTheThemeUntilOneIsChosen) {
+    Remembering first = begin();
+    first.open(ball());
+    first.session->setTheme(ThemeChoice::Light);
+    const glm::vec3 light = first.session->viewer().shading().backgroundTop;
+    first.session->setTheme(ThemeChoice::Dark);
+    EXPECT_NE(first.session->viewer().shading().backgroundTop, light);
+    first.session->setTheme(ThemeChoice::Light);
+    first.turn();
+    EXPECT_EQ(first.session->changes().backgroundTop, std::nullopt) << "nobody chose it";
+    end(first);
+
+    Remembering second = begin();
+    second.open(ball());
+    EXPECT_EQ(second.session->user().theme, ThemeChoice::Light);
+    EXPECT_EQ(second.session->viewer().shading().backgroundTop, light);
+    Shading shading = second.session->viewer().shading();
+    shading.backgroundTop = {1, 0, 0};
+    second.session->viewer().setShading(shading);
+    second.session->setTheme(ThemeChoice::Dark);
+    EXPECT_EQ(second.session->viewer().shading().backgroundTop, glm::vec3(1, 0, 0));
+    end(second);
+    Remembering third = begin();
+    third.session->setTheme(ThemeChoice::Light);
+    EXPECT_EQ(third.session->viewer().shading().backgroundTop, glm::vec3(1, 0, 0));
+}
+
+TEST_F(RememberingSessionTest, ANoteGoesByItself) {
+    Remembering window = begin();
+    window.open(ball());
+    window.session->keepBookmark(1);
+    window.turn();
+    EXPECT_NE(window.session->note(), "");
+    const auto next = window.session->update(window.now + 7);
+    ASSERT_TRUE(next);
+    EXPECT_LE(next->waitSeconds, 1) << "the window comes back to take it away";
+    EXPECT_NE(window.session->note(), "");
+    ASSERT_TRUE(window.session->update(window.now + 9));
+    EXPECT_EQ(window.session->note(), "");
+    ASSERT_EQ(window.session->layers().size(), 1u);
+    EXPECT_EQ(window.session->layers().front().name, "ball.vcp");
+    EXPECT_GT(window.session->layers().front().triangles, 0u);
+}
+
 TEST_F(RememberingSessionTest, ScenesBookmarksAndPastedCamerasTurnNothingOver) {
     Remembering first = begin();
     first.open(scene());

@@ -8,6 +8,7 @@ for tool in Xvfb xdotool import convert; do
 done
 rm -rf "$folder"; mkdir -p "$folder"; cd "$folder"
 export XDG_CACHE_HOME=$folder/cache XDG_CONFIG_HOME=$folder/config
+unset GTK_THEME  # the dark theme, in which letters are lighter than what they stand on
 
 fail() { echo "window_test: $*" >&2; cat log 2>/dev/null >&2; exit 1; }
 
@@ -63,7 +64,7 @@ ends() {
 key() { local k; for k; do xdotool key --window $window "$k"; done; }
 
 shot() { import -silent -window "$window" "$1.png"; }
-# The picture without the status line.
+# The picture without the status bar.
 scene() { convert "$1.png" -crop 640x440+0+0 +repage rgba:- | md5sum; }
 colours() { convert "$1.png" -unique-colors -format %w info:; }
 # waits_for WHAT CONDITION...: shots of the window until one fulfils the condition; machines may be slow, so up to a minute.
@@ -87,7 +88,7 @@ equals() { waits_for "$1 and $2 differ" is_same "$1" "$2"; }
 # Pictures of one sample are at rest at once.
 starts ball.ply ball.ply --size 640x480 --samples 1
 # The window shows its background and the build's progress first: wait for clay in the middle.
-is_first() { is_picture "$1" && [ "$(convert "$1.png" -format '%[fx:p{320,240}.r>0.6]' info:)" = 1 ]; }
+is_first() { is_picture "$1" && [ "$(convert "$1.png" -format '%[fx:p{320,240}.r>0.6&&p{300,220}.r>0.6&&p{340,260}.r>0.6]' info:)" = 1 ]; }
 waits_for "the first picture is empty" is_first start
 xdotool mousemove --window $window 320 240 mousedown 1 mousemove --window $window 380 260 mousemove --window $window 440 280 mouseup 1
 differs start orbit
@@ -121,8 +122,15 @@ xdotool keydown --window $window w sleep 0.2 keyup --window $window w
 differs centred flown
 key g F1
 differs flown help
-key F1 Tab
-differs help panel
+# What is typed searches the keys, and is none: x would cut, Escape would close the window.
+key x
+differs help searched
+key BackSpace
+equals help unsearched
+key Escape
+equals flown unhelped
+key Tab
+differs unhelped panel
 xdotool mousemove --window $window 320 240
 # What is fitted keeps clear of the panel: its left side is where the background was.
 key 1
@@ -130,11 +138,11 @@ is_beside_panel() { is_at_rest beside && [ "$(convert beside.png -format '%[fx:a
 waits_for "what is fitted is not beside the panel" is_beside_panel
 key Tab 1
 differs beside front
-# What is saved is what is shown; the scale bar is not.
+# What is saved is what is shown; toolbar and scale bar are not.
 key ctrl+s
 is_saved() { [ -s picture-1.png ]; }
 waits_for "no picture is saved" is_saved
-[ "$(convert front.png -crop 640x400+0+0 +repage shown.png; convert picture-1.png -crop 640x400+0+0 +repage saved.png
+[ "$(convert front.png -crop 640x360+0+40 +repage shown.png; convert picture-1.png -crop 640x360+0+40 +repage saved.png
     compare -metric AE -fuzz 2% shown.png saved.png null: 2>&1 || true)" -lt 100 ] || fail "what is saved is not what was shown"
 differs front noted
 # A turntable is saved between frames of the window; Esc ends it and keeps what is finished, whole.
@@ -150,12 +158,12 @@ ls turntable-1 | grep -v '^picture-0[0-9]*\.png$' && fail "something half-writte
 [ "$(convert picture-1.png turntable-1/picture-0001.png -metric AE -compare -format '%[distortion]' info:)" = 0 ] || fail "the turntable does not begin with the view as it was"
 shot noted
 key x
-# The section's handle is in the middle of what the status line leaves; Esc puts the plane back, and the window stays.
+# The section's handle is in the middle of what the bars leave; Esc puts the plane back, and the window stays.
 waits_for "no section" is_other noted section
-xdotool mousemove --window $window 320 230 mousedown 1 mousemove --window $window 320 180
+xdotool mousemove --window $window 320 248 mousedown 1 mousemove --window $window 320 198
 waits_for "the section does not move" is_other section moved
 key Escape
-xdotool mousemove --window $window 320 230
+xdotool mousemove --window $window 320 248
 waits_for "Esc does not put the section back" is_same section unmoved
 xdotool mouseup 1 mousemove --window $window 320 240
 key x d
@@ -200,6 +208,14 @@ xdotool mousemove --window $window 250 150 click --repeat 9 --delay 20 4
 differs resized unplugged
 ends 0
 
+# A file is opened from the list: the first one that holds what is typed.
+starts vcp --size 640x480 --samples 1
+key ctrl+o
+waits_for "the file list is not shown" is_at_rest listed
+key b a l l period p Return
+waits_for "what was chosen is not shown" is_first chosen_picture
+ends 0
+
 # A file is dropped into an empty window. Without a dataset the size is the one it was left with.
 if [ -n "$drop" ]; then
     export VCP_TEST_DROP=$folder/dropped
@@ -213,7 +229,7 @@ fi
 # What cannot be opened is said in the window, which stays.
 head -c 3000 ball.ply >broken.ply
 starts broken.ply broken.ply
-is_said() { shot said; [ "$(convert said.png -format '%[fx:p{300,10}.r>2*p{300,10}.g]' info:)" = 1 ]; }
+is_said() { shot said; [ "$(convert said.png -fuzz 10% -fill black +opaque '#ff6b5e' -format '%[fx:maxima>0]' info:)" = 1 ]; }
 waits_for "what went wrong is not said" is_said
 ends 1
 grep -q broken.ply log || fail "the error does not name the file"

@@ -1,0 +1,11 @@
+# cmake -D FOLDER=fonts -D OUTPUT=fonts.h -P embed_fonts.cmake: the fonts as arrays of bytes, kInterRegular and so on.
+set(text "#pragma once\n\nnamespace vcp {\n")
+foreach(font IN ITEMS inter_regular.otf:kInterRegular inter_semibold.otf:kInterSemibold icons.ttf:kIcons)
+    string(REPLACE ":" ";" font ${font})
+    list(GET font 0 file)
+    list(GET font 1 name)
+    file(READ ${FOLDER}/${file} bytes HEX)
+    string(REGEX REPLACE "(..)" "0x\\1," bytes "${bytes}")
+    string(APPEND text "\ninline constexpr unsigned char ${name}[] = {\n${bytes}\n};\n")
+endforeach()
+file(WRITE ${OUTPUT} "${text}\n}  // namespace vcp\n")

@@ -1,0 +1,63 @@
+#include "viewer/window/file_list.h"
+
+#include <algorithm>
+#include <cctype>
+#include <system_error>
+
+namespace vcp {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr const char* kExtensions[] = {".vcp", ".json", ".ply", ".obj", ".stl", ".off", ".gltf", ".glb", ".drc"};
+
+std::string lowered(std::string text) {
+    std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return char(std::tolower(c)); });
+    return text;
+}
+
+}  // namespace
+
+bool holds(const std::string& text, const std::string& part) {
+    return lowered(text).find(lowered(part)) != std::string::npos;
+}
+
+bool looksOpenable(const std::string& name) {
+    std::string plain = lowered(name);
+    for (const char* packed : {".gz", ".zst"})
+        if (plain.ends_with(packed)) plain.resize(plain.size() - std::string(packed).size());
+    return std::any_of(std::begin(kExtensions), std::end(kExtensions),
+                       [&](const char* extension) { return plain.ends_with(extension); });
+}
+
+void FileList::read(const fs::path& folder) {
+    std::error_code failed;
+    folder_ = fs::absolute(folder, failed).lexically_normal();
+    entries_.clear();
+    problem_.clear();
+    fs::directory_iterator at(folder_, failed);
+    for (; !failed && at != fs::directory_iterator() && entries_.size() < kMostEntries; at.increment(failed)) {
+        Entry entry{at->path().filename().string()};
+        std::error_code unknown;
+        entry.isFolder = at->is_directory(unknown);
+        if (entry.name.starts_with('.') || (!entry.isFolder && !looksOpenable(entry.name))) continue;
+        if (!entry.isFolder) entry.bytes = at->file_size(unknown);
+        if (!unknown) entries_.push_back(std::move(entry));
+    }
+    if (failed) problem_ = failed.message();
+    std::sort(entries_.begin(), entries_.end(), [](const Entry& a, const Entry& b) {
+        if (a.isFolder != b.isFolder) return a.isFolder;
+        const std::string one = lowered(a.name), other = lowered(b.name);
+        return one != other ? one < other : a.name < b.name;
+    });
+}
+
+std::vector<FileList::Entry> FileList::holding(const std::string& part) const {
+    std::vector<Entry> found;
+    std::copy_if(entries_.begin(), entries_.end(), std::back_inserter(found),
+                 [&](const Entry& entry) { return holds(entry.name, part); });
+    return found;
+}
+
+}  // namespace vcp

@@ -1,0 +1,323 @@
+// The panel at the right: what can be chosen, section by section.
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+#include <imgui.h>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+
+#include "viewer/scene/option_values.h"
+#include "viewer/scene/render_settings.h"
+#include "viewer/window/icons.h"
+#include "viewer/window/interface.h"
+
+namespace vcp {
+
+namespace {
+
+constexpr ImGuiWindowFlags kPanel = ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoCollapse |
+                                    ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoTitleBar;
+// Values are dragged, not typed: keys belong to the window.
+constexpr ImGuiSliderFlags kNoTyping = ImGuiSliderFlags_NoInput | ImGuiSliderFlags_AlwaysClamp;
+constexpr ImGuiColorEditFlags kColour =
+    ImGuiColorEditFlags_NoInputs | ImGuiColorEditFlags_NoOptions | ImGuiColorEditFlags_Float;
+
+constexpr int kMostPictures = 3600;
+constexpr double kPicturesPerSecond = 30;
+
+constexpr const char* kPictureSizeNames[] = {"As shown",    "1920 × 1080",  "3840 × 2160",
+                                             "7680 × 4320", "16384 × 9216", "16384 × 16384"};
+constexpr glm::ivec2 kPictureSizes[] = {{0, 0},       {1920, 1080},  {3840, 2160},
+                                        {7680, 4320}, {16384, 9216}, {16384, 16384}};
+
+/// Edits a colour: screens show colours encoded, the shading takes them linear.
+bool colourEdit(const char* label, glm::vec3& linear) {
+    float shown[3];
+    for (int i = 0; i < 3; ++i) shown[i] = std::pow(linear[i], 1 / 2.2f);
+    if (!ImGui::ColorEdit3(label, shown, kColour)) return false;
+    for (int i = 0; i < 3; ++i) linear[i] = std::pow(std::clamp(shown[i], 0.0f, 1.0f), 2.2f);
+    return true;
+}
+
+/// Returns the axis that a plane's normal is along; 3: none.
+int axisOf(const SectionPlane& plane) {
+    const glm::dvec3 normal = glm::abs(glm::normalize(plane.normal));
+    for (int axis = 0; axis < 3; ++axis)
+        if (normal[axis] > 1 - 1e-9) return axis;
+    return 3;
+}
+
+}  // namespace
+
+void Interface::layOutPanel() {
+    ImGui::SetNextWindowPos({size_.x - panelWidth_, toolbarHeight_});
+    ImGui::SetNextWindowSize({panelWidth_, size_.y - statusHeight_ - toolbarHeight_});
+    ImGui::PushStyleVar(ImGuiStyleVar_WindowRounding, 0.0f);
+    ImGui::PushStyleVar(ImGuiStyleVar_WindowPadding, ImVec2(units(16), units(8)));
+    ImGui::Begin("panel", nullptr, kPanel | ImGuiWindowFlags_NoBringToFrontOnFocus);
+    ImGui::PopStyleVar(2);
+    ImGui::GetWindowDrawList()->AddLine({size_.x - panelWidth_ + 0.5f, toolbarHeight_},
+                                        {size_.x - panelWidth_ + 0.5f, size_.y - statusHeight_}, look_->palette.line,
+                                        units(1));
+    const auto section = [&](const char* sign, const char* name, bool isOpenAtFirst, void (Interface::*layOutRest)()) {
+        ImGui::PushID(name);
+        if (sectionHead(*look_, sign, name, isOpenAtFirst)) {
+            (this->*layOutRest)();
+            ImGui::Dummy({0, units(4)});
+        }
+        const float y = ImGui::GetCursorScreenPos().y;
+        ImGui::GetWindowDrawList()->AddLine({size_.x - panelWidth_, y}, {size_.x, y}, look_->palette.line, units(1));
+        ImGui::Dummy({0, 0});
+        ImGui::PopID();
+    };
+    section(icon::kView, "View", true, &Interface::layOutView);
+    section(icon::kLight, "Light", true, &Interface::layOutLight);
+    section(icon::kCut, "Cut", true, &Interface::layOutCut);
+    section(icon::kMeasure, "Measure", true, &Interface::layOutMeasuring);
+    section(icon::kLayers, "Layers", false, &Interface::layOutLayers);
+    section(icon::kPicture, "Save", false, &Interface::layOutSave);
+    section(icon::kDetails, "Details", false, &Interface::layOutLimits);
+    ImGui::End();
+}
+
+void Interface::actionButton(const char* label, ViewerAction action, const Tip& tip, float width) {
+    if (textButton(*look_, nullptr, label, tip, width)) session_->act(action);
+}
+
+void Interface::layOutView() {
+    const OrbitCamera& camera = session_->viewer().camera();
+    const float gap = units(8), quarter = (ImGui::GetContentRegionAvail().x - 3 * gap) / 4;
+    actionButton("Front", ViewerAction::ViewFront, {"From the front", "1"}, quarter);
+    ImGui::SameLine(0, gap);
+    actionButton("Right", ViewerAction::ViewRight, {"From the right", "3"}, quarter);
+    ImGui::SameLine(0, gap);
+    actionButton("Top", ViewerAction::ViewTop, {"From above", "7"}, quarter);
+    ImGui::SameLine(0, gap);
+    actionButton("Iso", ViewerAction::ViewIsometric, {"Isometric", "9"}, quarter);
+    static constexpr const char* kProjections[] = {"Perspective", "Parallel"};
+    int projection = camera.projection == Projection::Perspective ? 0 : 1;
+    if (choiceRow(*look_, "projection", kProjections, projection,
+                  {"Perspective, or parallel for measuring by eye", "P"}))
+        session_->act(ViewerAction::ToggleProjection);
+    static constexpr const char* kAxes[] = {"Y is up", "Z is up"};
+    int up = camera.up == UpAxis::Y ? 0 : 1;
+    if (choiceRow(*look_, "up", kAxes, up, {"The axis that points up", "U"})) session_->act(ViewerAction::ToggleUpAxis);
+    layOutBookmarks();
+    caption(*look_, "Theme");
+    static constexpr const char* kThemes[] = {"System", "Light", "Dark"};
+    int theme = int(session_->user().theme);
+    if (choiceRow(*look_, "theme", kThemes, theme, {"Light or dark, or as the desktop says", ""}))
+        session_->setTheme(static_cast<ThemeChoice>(theme));
+}
+
+void Interface::layOutBookmarks() {
+    caption(*look_, "Bookmarks");
+    const auto* kept = session_->bookmarks();
+    const float side = units(24), left = ImGui::GetCursorPosX(), right = left + ImGui::GetContentRegionAvail().x;
+    bool isFirst = true;
+    // A row is full where the next button would not fit beside the ones that edit.
+    const auto nextButton = [&] {
+        if (!isFirst) ImGui::SameLine(0, units(4));
+        if (ImGui::GetCursorPosX() + side > right - 2 * side - units(16)) ImGui::NewLine();
+        isFirst = false;
+    };
+    int free = 1;
+    while (kept && kept->contains(free)) ++free;
+    for (int number = 1; kept && number <= int(UserSettings::kMostBookmarks); ++number) {
+        if (!kept->contains(number)) continue;
+        nextButton();
+        const std::string name = std::to_string(number), keys = "Shift+" + name;
+        if (textButton(*look_, nullptr, name.c_str(), {"Go to this bookmark", keys.c_str()}, side))
+            session_->goToBookmark(number);
+    }
+    if (free <= int(UserSettings::kMostBookmarks)) {
+        nextButton();
+        const std::string keys = fmt::format("Ctrl+{}", free);
+        if (iconButton(*look_, icon::kAdd, "keep", {"Keep this view as a bookmark", keys.c_str()}, false, 24))
+            session_->keepBookmark(free);
+    }
+    ImGui::SameLine(right - 2 * side);
+    if (iconButton(*look_, icon::kCopy, "copy camera", {"Copy the camera as JSON", "Ctrl+C"}, false, 24)) copyCamera();
+    ImGui::SameLine(0, 0);
+    if (iconButton(*look_, icon::kPaste, "paste camera", {"Go to the copied camera", "Ctrl+V"}, false, 24))
+        pasteCamera();
+}
+
+void Interface::layOutLight() {
+    Viewer& viewer = session_->viewer();
+    Shading shading = viewer.shading();
+    int mode = int(shading.mode);
+    static constexpr const char* kNames[] = {"Lit",
+                                             "Clay",
+                                             "Unlit colours",
+                                             "Normals",
+                                             "Work: steps of rays",
+                                             "Work: cells",
+                                             "Work: reads of memory",
+                                             "Level of detail",
+                                             "Error"};
+    static_assert(std::size(kNames) == kShadingNames.size());
+    if (comboRow(*look_, "##shading", kNames, mode, {"What colours show", "M"}))
+        shading.mode = static_cast<ShadingMode>(mode);
+    // On files that are drawn without shadows, the switch does nothing.
+    ImGui::BeginDisabled(!viewer.whyWithout(ViewerAction::ToggleShadows).empty());
+    switchRow(*look_, "Shadows", shading.shadows, {"Light is cast from one side", "S"});
+    bool occlusion = shading.occlusionRays > 0;
+    if (switchRow(*look_, "Ambient occlusion", occlusion, {"Corners and folds are darker", "O"}))
+        shading.occlusionRays = occlusion ? kUsualOcclusionRays : 0;
+    ImGui::EndDisabled();
+    bool follows = shading.lightFollowsCamera;
+    const bool isTurned =
+        switchRow(*look_, "Light follows the camera", follows, {"Ctrl + left drag turns the light", "L"});
+    ImGui::AlignTextToFramePadding();
+    text("Background");
+    ImGui::SameLine(ImGui::GetCursorPosX() + ImGui::GetContentRegionAvail().x - units(56));
+    colourEdit("##above", shading.backgroundTop);
+    showTip(*look_, {"Above", ""});
+    ImGui::SameLine();
+    colourEdit("##below", shading.backgroundBottom);
+    showTip(*look_, {"Below", ""});
+    if (shading != viewer.shading()) viewer.setShading(shading);
+    if (isTurned) session_->act(ViewerAction::ToggleLight);
+}
+
+void Interface::layOutCut() {
+    Viewer& viewer = session_->viewer();
+    bool isCut = !viewer.sections().empty();
+    if (switchRow(*look_, "Cut open", isCut, {"Cut with a plane through the middle", "X"}))
+        session_->act(ViewerAction::ToggleSection);
+    if (viewer.sections().size() != 1) return;
+    const SectionPlane plane = viewer.sections().front();
+    static constexpr const char* kAxes[] = {"X", "Y", "Z"};
+    int axis = axisOf(plane);
+    if (choiceRow(*look_, "axis", kAxes, axis, {"Cut across an axis, through the middle", ""})) {
+        glm::dvec3 normal(0);
+        normal[axis] = 1;
+        viewer.setSections({{normal, glm::dot(normal, viewer.bounds().centre())}});
+    }
+    if (textButton(*look_, icon::kFlip, "Keep the other side")) viewer.setSections({{-plane.normal, -plane.offset}});
+    ImGui::PushStyleColor(ImGuiCol_Text, look_->palette.dim);
+    wrapped("Drag the arrow to move the plane, its ring to turn it; Shift + wheel moves it too.");
+    ImGui::PopStyleColor();
+}
+
+void Interface::layOutMeasuring() {
+    switchRow(*look_, "Click measures", session_->isMeasuring, {"Click points on the surface", "D"});
+    Measurement& measured = session_->measurement();
+    if (measured.empty()) {
+        if (!session_->isMeasuring) return;
+        ImGui::PushStyleColor(ImGuiCol_Text, look_->palette.dim);
+        wrapped("Click points on the surface. Enter ends a line, Backspace takes a point back.");
+        ImGui::PopStyleColor();
+        return;
+    }
+    for (size_t number = 0; number < measured.lines().size(); ++number) layOutMeasuredLine(number);
+    if (textButton(*look_, icon::kCopy, "Copy", {"Copy what is measured as text", ""})) copyMeasurement();
+    ImGui::SameLine();
+    if (textButton(*look_, icon::kExport, "Export", {"Write measurement-1.csv and .json", "Ctrl+E"}))
+        session_->exportMeasurement();
+    ImGui::SameLine();
+    if (textButton(*look_, icon::kDelete, "Clear")) measured.clear();
+}
+
+void Interface::layOutMeasuredLine(size_t number) {
+    const MeasuredLine& line = session_->measurement().lines()[number];
+    if (session_->measurement().lines().size() > 1) caption(*look_, fmt::format("Line {}", number + 1).c_str());
+    for (const MeasuredText& each : measuredTexts(line)) valueRow(*look_, typeset(each.what).c_str(), each.value);
+}
+
+void Interface::layOutLayers() {
+    for (const ViewSession::Layer& layer : session_->layers())
+        valueRow(*look_, fitted(layer.name, ImGui::GetContentRegionAvail().x * 0.6f).c_str(),
+                 layer.triangles > 0 ? formatCount(layer.triangles) : std::string("relief"));
+    ImGui::Dummy({0, 0});
+    switchRow(*look_, "Boxes of the parts drawn", session_->showsPages,
+              {"The subvolumes that the picture is made of: blue is coarse, red is fine", "B"});
+    bool feedback = session_->showsFeedback();
+    if (switchRow(*look_, "Where detail is asked for", feedback,
+                  {"Which rays of the picture asked for finer parts", "I"}))
+        session_->showFeedback(feedback);
+}
+
+void Interface::layOutSave() {
+    comboRow(*look_, "##size", kPictureSizeNames, pictureSize_, {"The size of what is saved", ""});
+    switchRow(*look_, "No background", picture_.transparent, {"What is not hit is transparent", ""});
+    switchRow(*look_, "Depth as well", picture_.depth, {"Distances along the rays, as .pfm", ""});
+    ImGui::BeginDisabled(session_->saving().has_value());
+    if (textButton(*look_, icon::kPicture, "Save the picture", {"picture-1.png in the working folder", "Ctrl+S"}, -1))
+        savePicture();
+    caption(*look_, "Many pictures");
+    ImGui::SetNextItemWidth(-1);
+    ImGui::SliderInt("##pictures", &sequencePictures_, 2, kMostPictures, "%d pictures",
+                     kNoTyping | ImGuiSliderFlags_Logarithmic);
+    const float half = (ImGui::GetContentRegionAvail().x - units(8)) / 2;
+    if (textButton(*look_, icon::kTurntable, "Turntable", {"Once around, in a folder of its own", "Ctrl+T"}, half))
+        saveTurntable();
+    ImGui::SameLine();
+    if (textButton(*look_, icon::kPath, "Path", {"Smoothly through the bookmarks", "Ctrl+B"}, half)) savePath();
+    ImGui::EndDisabled();
+    valueRow(*look_, "As a film",
+             fmt::format("{:.1f} s at {} a second", sequencePictures_ / kPicturesPerSecond, kPicturesPerSecond));
+}
+
+void Interface::layOutLimits() {
+    Viewer& viewer = session_->viewer();
+    const ViewerStatus& status = viewer.status();
+    caption(*look_, "Error that may be seen");
+    auto error = float(viewer.errorPixels());
+    ImGui::SetNextItemWidth(-1);
+    const std::string shown = typeset("%.2f px");
+    if (ImGui::SliderFloat("##error", &error, 0.1f, 16.0f, shown.c_str(), kNoTyping | ImGuiSliderFlags_Logarithmic))
+        viewer.setErrorPixels(double(error));
+    showTip(*look_, {"Detail is read until the picture errs by no more than this", ""});
+    caption(*look_, "Memory that detail may take");
+    uint64_t budget = status.budgetBytes;
+    const float right = ImGui::GetCursorPosX() + ImGui::GetContentRegionAvail().x;
+    ImGui::AlignTextToFramePadding();
+    text(typeset(fmt::format("{} of {}", formatBytes(status.update.residentBytes), formatBytes(budget))));
+    ImGui::SameLine(right - units(56));
+    if (iconButton(*look_, icon::kRemove, "half the budget", {"Half of it", ""}, false, 24)) budget /= 2;
+    ImGui::SameLine();
+    if (iconButton(*look_, icon::kAdd, "double the budget", {"Twice as much", ""}, false, 24)) budget *= 2;
+    progressBar(*look_, double(status.update.residentBytes) / double(std::max<uint64_t>(status.budgetBytes, 1)));
+    if (budget != status.budgetBytes)
+        if (const auto set = viewer.setBudget(budget); !set) session_->say(set.error().line());
+    ImGui::Dummy({0, 0});
+    layOutDetails();
+}
+
+void Interface::layOutDetails() {
+    const ViewerStatus& status = session_->viewer().status();
+    const UpdateResult& update = status.update;
+    const glm::ivec2 size = session_->viewer().size();
+    valueRow(*look_, "State", stateText());
+    if (std::isfinite(update.errorPixels)) valueRow(*look_, "Error now", formatPixels(update.errorPixels) + " px");
+    if (status.levels > 0) {
+        valueRow(*look_, "Levels drawn",
+                 fmt::format("{} to {} of 0 to {}", update.coarsestLevel, update.finestLevel, status.levels - 1));
+        valueRow(*look_, "Triangles", formatCount(status.triangles));
+        valueRow(*look_, "Parts drawn", fmt::format("{} of {} in memory", update.pagesInCut, update.pagesResident));
+        valueRow(*look_, "Read", formatBytes(update.bytesRead));
+    }
+    if (status.frame.surfaceBytes > 0) valueRow(*look_, "Mesostructure", formatBytes(status.frame.surfaceBytes));
+    const uint32_t most = std::max(session_->viewer().samples(), status.samples);
+    valueRow(*look_, "Samples", fmt::format("{} of {}", status.samples, most));
+    valueRow(*look_, "A picture takes", fmt::format("{:.0f} ms", status.frame.msFrame));
+    valueRow(*look_, "Size", fmt::format("{} x {}", size.x, size.y));
+    valueRow(*look_, "Device", status.device + (status.software ? " (software)" : ""));
+}
+
+PictureChoice Interface::pictureChosen() const {
+    PictureChoice choice = picture_;
+    choice.size = pictureSize_ == 0 ? session_->viewer().size() : kPictureSizes[pictureSize_];
+    return choice;
+}
+
+void Interface::savePicture() { session_->savePicture(pictureChosen()); }
+
+void Interface::saveTurntable() { session_->saveTurntable(pictureChosen(), sequencePictures_); }
+
+void Interface::savePath() { session_->savePath(pictureChosen(), sequencePictures_); }
+
+}  // namespace vcp

@@ -1,0 +1,71 @@
+// How the window looks: colours of the light and the dark theme, and what the desktop prefers.
+//
+// All sizes of the layout are in units of 8: a unit is a pixel at scale 1.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <imgui.h>
+#include <glm/vec3.hpp>
+
+#include "viewer/window/user_settings.h"
+
+namespace vcp {
+
+/// Colours by what they are for, as Dear ImGui packs them. There is one accent.
+struct Palette {
+    ImU32 ground;    ///< of bars and the panel
+    ImU32 raised;    ///< of cards, popups and plates over the picture
+    ImU32 control;   ///< of buttons and tracks
+    ImU32 hovered;   ///< of those under the cursor
+    ImU32 chosen;    ///< of the one of several names that is chosen
+    ImU32 line;      ///< between parts
+    ImU32 ink;       ///< of text
+    ImU32 dim;       ///< of text that says less
+    ImU32 accent;    ///< of what is on, chosen or measured
+    ImU32 onAccent;  ///< of text and icons on the accent
+    ImU32 problem;
+    ImU32 halo;  ///< around lines over the picture
+};
+
+/// What panels are laid out with.
+struct Look {
+    float scale = 1;
+    Palette palette{};
+    ImFont *body = nullptr, *strong = nullptr, *small = nullptr, *title = nullptr;
+    /// A picture of InterfacePainter::setPictures in the fonts' texture.
+    struct Texture {
+        ImVec2 from, to;
+    };
+    std::vector<Texture> pictures;
+
+    [[nodiscard]] float units(float n) const { return n * scale; }
+};
+
+const Palette& paletteOf(bool isDark);
+/// Sets Dear ImGui's colours and sizes.
+void applyPalette(const Palette& palette, float scale);
+
+/// Returns the picture's background where none was chosen: above and below, linear.
+struct Background {
+    glm::vec3 top, bottom;
+};
+Background backgroundOf(bool isDark);
+
+/// Returns the scale of the layout: the display's, but never so large that a window has less than 320 x 240 units.
+/// Quarters, from 1 to 4.
+float layoutScale(float display, int width, int height);
+
+/// Returns whether the desktop asks for dark windows: what GTK_THEME says; else the settings files of GTK 4, GTK 3 and
+/// KDE in `config`; else nothing. `variable` returns an environment variable, empty where it is not set. Files are
+/// read up to 64 KiB and may hold anything.
+std::optional<bool> desktopIsDark(const std::function<std::string(const char*)>& variable,
+                                  const std::filesystem::path& config);
+/// Returns whether windows are dark: as chosen, as the desktop of this process asks, or, where it does not say, dark.
+bool isDark(ThemeChoice choice);
+
+}  // namespace vcp
