@@ -16,7 +16,7 @@ std::vector<std::string> wordsOf(const std::string& type) {
 ValueKind kindOf(const std::string& value) {
     const auto names = [&](const char* part) { return value.find(part) != std::string::npos; };
     if (names("DIR")) return ValueKind::Folder;
-    if (names("FILE") || names("OUT.") || names("PREFIX")) return ValueKind::File;
+    if (names("FILE") || names("OUT") || names("PREFIX")) return ValueKind::File;
     return ValueKind::Text;
 }
 
