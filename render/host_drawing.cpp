@@ -48,7 +48,7 @@ PlacedCut placedCut(Residency& residency, ViewNumber view) {
         const uint64_t colours = residency.hasColour() ? entry.colourBytes : 0;
         placed.views.push_back(viewOfChecked(bytes.first(entry.pageBytes), bytes.subspan(entry.pageBytes, colours)));
         HostPage page{.view = &placed.views.back(),
-                      .number = drawn.number,
+                      .number = number,
                       .place = mortonDecode(entry.morton),
                       .level = entry.level,
                       .error = float(double(entry.certifiedError) / dataset.header.cell)};
