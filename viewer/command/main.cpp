@@ -137,10 +137,8 @@ int runCommandLine(int argc, char** argv) {
         return printLine(vcp.help()) ? 0 : kFailed;
     } catch (const CLI::CallForVersion& version) {
         return printLine(version.what()) ? 0 : kFailed;
-    } catch (const CLI::ExtrasError& wrong) {
-        return complainOfUsage(vcp, wrong.what() + suggestionFor(vcp));
     } catch (const CLI::ParseError& wrong) {
-        return complainOfUsage(vcp, wrong.what());
+        return complainOfUsage(vcp, wrong.what() + suggestionFor(vcp));
     }
     if (vcp.get_subcommands().empty()) return complainOfUsage(vcp, "a command is needed");
     return runParsed(vcp, commands);
