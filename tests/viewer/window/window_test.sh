@@ -128,7 +128,7 @@ differs help searched
 key BackSpace
 equals help unsearched
 key Escape
-equals flown unhelped
+differs unsearched unhelped
 key Tab
 differs unhelped panel
 xdotool mousemove --window $window 320 240
