@@ -63,7 +63,7 @@ takes() {
 opens dark 1600x1000 statue statue.vcp --shadows --occlusion 8
 takes whole
 key Tab d
-for point in "600 400" "640 480" "620 700"; do rests; at $point click 1; done
+for point in "795 400" "800 520" "770 680"; do rests; at $point click 1; done
 away
 takes measuring
 key F1

@@ -119,7 +119,8 @@ void InterfacePainter::makeFonts() {
         for (size_t y = 0; y < pictures_[i].height; ++y)
             std::copy_n(&pictures_[i].rgba[y * row], row,
                         texels + (size_t{place.Y} + y) * size_t(width) * 4 + size_t{place.X} * 4);
-        atlas.CalcCustomRectUV(&place, &look_.pictures.emplace_back().from, &look_.pictures.back().to);
+        Look::Texture& texture = look_.pictures.emplace_back();
+        atlas.CalcCustomRectUV(&place, &texture.from, &texture.to);
     }
 }
 

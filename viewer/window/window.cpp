@@ -287,7 +287,8 @@ private:
 
     void key(int key, int action, int mods) {
         if (action == GLFW_REPEAT && !interface_.takesText()) return;
-        const bool mayFly = (mods & GLFW_MOD_CONTROL) == 0 && (session_->viewer().isFlying() || action == GLFW_RELEASE);
+        const bool isFlying = session_->viewer().isFlying() && !interface_.takesText();
+        const bool mayFly = (mods & GLFW_MOD_CONTROL) == 0 && (isFlying || action == GLFW_RELEASE);
         if (mayFly && holdFlyKey(held_, uint32_t(key), action == GLFW_PRESS)) {
             session_->viewer().fly(session_->viewer().isFlying() ? held_ : glm::dvec3(0));
             return;

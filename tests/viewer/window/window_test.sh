@@ -128,7 +128,7 @@ differs help searched
 key BackSpace
 equals help unsearched
 key Escape
-equals flown unhelped
+differs unsearched unhelped
 key Tab
 differs unhelped panel
 xdotool mousemove --window $window 320 240
@@ -181,7 +181,7 @@ awk -F, 'NR>1 { n++; r=sqrt($3*$3+$4*$4+$5*$5); if (r<0.88 || r>1.12 || $6<=0) e
     END { if (n!=2) exit 1 }' measurement-1.csv || { cat measurement-1.csv; fail "what was measured is wrong"; }
 xdotool key --window $window Escape
 xdotool windowsize $window 500 300
-is_resized() { is_picture resized && [ "$(convert resized.png -format '%wx%h:%[fx:p{250,150}.r>0.6]' info:)" = 500x300:1 ]; }
+is_resized() { is_picture resized && [ "$(convert resized.png -format '%wx%h:%[fx:p{210,150}.r>0.6]' info:)" = 500x300:1 ]; }
 waits_for "no picture of the size asked for after a resize" is_resized
 # At rest the window sleeps: how often its thread was woken in two seconds.
 wakes() { awk '/ctxt_switches/ { n += $2 } END { print n }' /proc/$viewer/status; }
