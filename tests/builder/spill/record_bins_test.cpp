@@ -2,6 +2,7 @@
 #include "builder/spill/record_bins.h"
 
 #include <algorithm>
+#include <cstring>
 #include <fstream>
 #include <random>
 #include <thread>
@@ -147,15 +148,24 @@ TEST_F(Bins, GoOnAfterAnInterruption) {
     expectHolds(bins, all);
 }
 
-TEST_F(Bins, SmoothRecordsAreSmall) {
-    TempSpace space(folder_ / "temp", 1 << 30);
-    RecordBins<Record> bins(space, "bins", 1, 1 << 20);
-    std::vector<Record> records(50000);
+TEST_F(Bins, SmoothRecordsAreSmallWhereMemoryIsShort) {
+    std::vector<Record> records(400000);
     for (size_t i = 0; i < records.size(); ++i)
         records[i] = {{int32_t(i * 5), 1000000 - int32_t(i), 7}, 1, uint32_t(i / 3)};
-    ASSERT_TRUE(bins.append(0, records).ok());
-    ASSERT_TRUE(bins.raw().flush().ok());
-    EXPECT_LT(bins.raw().bytes(), records.size() * sizeof(Record) / 4);
+    const uint64_t bytes = records.size() * sizeof(Record);
+    for (const uint64_t memory : {uint64_t{0}, bytes, 4 * bytes}) {
+        TempSpace space(folder_ / "temp", memory);
+        RecordBins<Record> bins(space, "bins", 1, 1 << 20);
+        ASSERT_TRUE(bins.append(0, records).ok());
+        ASSERT_TRUE(bins.raw().flush().ok());
+        // What half of the memory holds is left as it is.
+        const uint64_t plain = std::min(memory / 2, bytes);
+        EXPECT_LT(bins.raw().bytes(), plain + (bytes - plain) / 4 + bytes / 50) << memory;
+        EXPECT_GE(bins.raw().bytes(), plain * 9 / 10) << memory;
+        const auto back = bins.load(0);
+        ASSERT_TRUE(back.ok()) << back.error().line();
+        EXPECT_EQ(std::memcmp(back->data(), records.data(), bytes), 0) << memory;
+    }
 }
 
 TEST_F(Bins, EveryDamageIsNoticed) {

@@ -123,7 +123,7 @@ TEST(PageCodec, ADraftIsItsPage) {
         PageDraft draft = draftOf(page.view());
         EXPECT_EQ(draft.lists.size(), draft.begin.back());
         const std::vector<std::byte> whole = pageOf(draft);
-        const auto view = parsePage(whole);
+        const auto view = parsePage(whole, asBytes(page.colour));
         ASSERT_TRUE(view.ok()) << view.error().line();
         expectSamePage(page.view(), *view);
         const auto packed = packPage(draft, asBytes(page.colour));
