@@ -196,6 +196,13 @@ glm::dvec2 upperLeft(const FrameRequest& request) {
     return glm::dvec2(tile.x, tile.y) + sampleOffset(request.sample);
 }
 
+PixelHit pixelHit(const FrameRequest& request, PicturePixel pixel, double depth, glm::vec3 normal) {
+    const PictureTile whole = wholePicture(request);
+    const glm::dvec2 at = upperLeft(request) + glm::dvec2(pixel.x, pixel.y) + 0.5;
+    const CameraRay ray = cameraRay(request.camera, whole.fullWidth, whole.fullHeight, at.x, at.y);
+    return {.depth = depth, .position = ray.origin + ray.direction * depth, .normal = normal};
+}
+
 std::vector<uint32_t> backgroundRows(const FrameRequest& request) {
     const Shading& shading = request.shading;
     std::vector<uint32_t> rows(request.height);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "render/frame_request.h"
+#include "render/frame_result.h"
 #include "render/shared/frame.h"
 #include "render/similarity.h"
 #include "streaming/page_selection.h"
@@ -35,6 +36,9 @@ PictureTile wholePicture(const FrameRequest& request);
 /// Returns where the upper left corner of the part that a request draws is seen, in pixels of the whole: where the
 /// tile begins, moved by the request's sample.
 glm::dvec2 upperLeft(const FrameRequest& request);
+
+/// Returns what a pixel shows: a hit in depth `depth` (world units from the ray's origin), with a unit normal.
+PixelHit pixelHit(const FrameRequest& request, PicturePixel pixel, double depth, glm::vec3 normal);
 
 /// Returns the picture's background, one RGBA8 word a row.
 std::vector<uint32_t> backgroundRows(const FrameRequest& request);

@@ -10,7 +10,7 @@
 
 #include "octree/io/result.h"
 #include "octree/reference_caster.h"
-#include "render/renderer.h"
+#include "render/view/renderer.h"
 
 namespace vcp {
 

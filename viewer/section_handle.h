@@ -14,7 +14,7 @@
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 
-#include "render/renderer.h"
+#include "render/view/renderer.h"
 #include "viewer/camera/orbit_camera.h"
 
 namespace vcp {

@@ -31,7 +31,7 @@
 #include <glm/vec3.hpp>
 
 #include "octree/io/result.h"
-#include "render/renderer.h"
+#include "render/view/renderer.h"
 #include "viewer/camera/orbit_camera.h"
 #include "viewer/scene/meso_scene.h"
 #include "viewer/section_handle.h"

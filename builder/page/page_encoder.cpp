@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <cstring>
 #include <limits>
 #include <unordered_map>
 
@@ -184,10 +183,9 @@ public:
     uint32_t add(const HardLeaf& leaf) {
         for (const uint32_t k : leaf.triangles) {
             if (numbers_[k] == kNone) numbers_[k] = triangle(tree_.triangles[k]);
-            draft_.lists.push_back(numbers_[k]);
+            draft_.lists.triangles.push_back(numbers_[k]);
         }
-        draft_.begin.push_back(uint32_t(draft_.lists.size()));
-        return draftLeaf(uint32_t(draft_.begin.size() - 2));
+        return draftLeaf(draft_.lists.endList());
     }
 
     std::vector<uint32_t> colours;
@@ -261,11 +259,6 @@ private:
     TrianglePacker& triangles_;
     Clearance& clearance_;
 };
-
-template <class T>
-void copyTo(std::span<std::byte> bytes, uint64_t offset, const std::vector<T>& items) {
-    if (!items.empty()) std::memcpy(bytes.data() + offset, items.data(), items.size() * sizeof(T));
-}
 
 /// Returns all that separates the page's surface from the mesh, in cells: certified leaves, the level's stray, the
 /// slack of hard leaves' triangles (1e-4 cells).

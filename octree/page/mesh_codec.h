@@ -246,7 +246,7 @@ private:
 
     /// Makes the hard leaves' strips, in the order of the leaves, and their words.
     void fillLeaves() {
-        const std::optional<Lists> lists = Coder::kEncodes ? listsOfSource() : findLists(page_.mostEntries);
+        const std::optional<LeafLists> lists = Coder::kEncodes ? listsOfSource() : findLists(page_.mostEntries);
         if (!lists) {
             page_.wrong = true;
             return;
@@ -264,30 +264,19 @@ private:
         if (page_.entries.size() > page_.mostEntries) page_.wrong = true;
     }
 
-    /// The triangles of each hard leaf, in ascending order.
-    struct Lists {
-        std::vector<uint32_t> triangles, begin;
-
-        [[nodiscard]] std::span<const uint32_t> of(uint32_t leaf) const {
-            return std::span(triangles).subspan(begin[leaf], begin[leaf + 1] - begin[leaf]);
-        }
-        bool operator==(const Lists&) const = default;
-    };
-
     /// How many nodes may be looked at for the lists of a page whose leaves name so many triangles.
     static uint64_t mostVisits(uint32_t named) { return uint64_t{256} * named + 65536; }
 
-    /// Encoder: returns the lists, or nothing where the decoder would not find the same.
-    std::optional<Lists> listsOfSource() {
-        Lists lists;
-        lists.begin.push_back(0);
-        lists.triangles.reserve(page_.source->lists.size());
+    /// Encoder: returns the leaves' lists, each ascending, or nothing where the decoder would not find the same.
+    std::optional<LeafLists> listsOfSource() {
+        LeafLists lists;
+        lists.triangles.reserve(page_.source->lists.triangles.size());
         page_.forEachNode([&](uint32_t word, uint32_t source, const NodePlace&) {
             if (nodeType(word) != kNodeHard) return;
-            for (const uint32_t t : page_.source->listOf(draftList(source)))
+            for (const uint32_t t : page_.source->lists.of(draftList(source)))
                 lists.triangles.push_back(source_.newNumber(t));
             std::sort(lists.triangles.begin() + lists.begin.back(), lists.triangles.end());
-            lists.begin.push_back(uint32_t(lists.triangles.size()));
+            lists.endList();
         });
         const uint32_t named = uint32_t(lists.triangles.size());
         const bool isFound = page_.source->listsAreCertain && visitsAtMost() <= mostVisits(named);
@@ -305,8 +294,8 @@ private:
         return visits;
     }
 
-    /// Finds the lists. Returns nothing where they name more than `most` triangles.
-    std::optional<Lists> findLists(uint32_t most) const {
+    /// Finds the lists, each ascending. Returns nothing where they name more than `most` triangles.
+    std::optional<LeafLists> findLists(uint32_t most) const {
         struct Entry {
             uint32_t leaf, triangle;
         };
@@ -322,7 +311,7 @@ private:
             if (entries.size() > most || visits > work) return {};
             work -= visits;
         }
-        Lists lists;
+        LeafLists lists;
         lists.begin.assign(size_t{hardLeaves_} + 1, 0);
         for (const Entry& e : entries) ++lists.begin[e.leaf + 1];
         for (uint32_t leaf = 0; leaf < hardLeaves_; ++leaf) lists.begin[leaf + 1] += lists.begin[leaf];

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <span>
 #include <vector>
 
@@ -44,6 +45,12 @@ PageSections pageSections(const PageHeader& header);
 
 /// Returns the bytes of the colour page that belongs to a page.
 uint64_t colourPageBytes(const PageHeader& header);
+
+/// Copies items to where a section of a page, or of its colours, begins.
+template <class T>
+void copyTo(std::span<std::byte> bytes, uint64_t offset, const std::vector<T>& items) {
+    if (!items.empty()) std::memcpy(bytes.data() + offset, items.data(), items.size() * sizeof(T));
+}
 
 /// A checked page. Spans point into the bytes it was parsed from, which must outlive it.
 struct PageView {

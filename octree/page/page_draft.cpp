@@ -9,11 +9,6 @@ namespace vcp {
 
 namespace {
 
-template <class T>
-void copyTo(std::vector<std::byte>& bytes, uint64_t offset, const std::vector<T>& items) {
-    if (!items.empty()) std::memcpy(bytes.data() + offset, items.data(), items.size() * sizeof(T));
-}
-
 /// Calls `visit(word)` for the root and every node, in order.
 template <class Page, class Visit>
 void forEachWord(Page& page, Visit&& visit) {
@@ -33,7 +28,7 @@ std::vector<std::byte> pageOf(const PageDraft& draft) {
     forEachWord(page, [&](uint32_t& word) {
         if (nodeType(word) != kNodeHard || entries.size() > kHardFirstMask) return;
         list.clear();
-        for (const uint32_t t : draft.listOf(draftList(word))) list.push_back(draft.triangles[t]);
+        for (const uint32_t t : draft.lists.of(draftList(word))) list.push_back(draft.triangles[t]);
         word = appendHardLeaf(list, entries);
     });
     page.header.entries = uint32_t(entries.size());
@@ -65,10 +60,9 @@ PageDraft draftOf(const PageView& page) {
                 draft.triangles.push_back(t);
                 number = uint32_t(draft.triangles.size());
             }
-            draft.lists.push_back(number - 1);
+            draft.lists.triangles.push_back(number - 1);
         });
-        word = draftLeaf(uint32_t(draft.begin.size() - 1));
-        draft.begin.push_back(uint32_t(draft.lists.size()));
+        word = draftLeaf(draft.lists.endList());
     });
     return draft;
 }

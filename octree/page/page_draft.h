@@ -12,21 +12,32 @@
 
 namespace vcp {
 
+/// The triangles of each leaf, list after list.
+struct LeafLists {
+    std::vector<uint32_t> triangles;
+    std::vector<uint32_t> begin{0};  ///< where each list begins, and the end
+
+    [[nodiscard]] std::span<const uint32_t> of(uint32_t leaf) const {
+        return std::span(triangles).subspan(begin[leaf], begin[leaf + 1] - begin[leaf]);
+    }
+    /// Ends a list, whose triangles were appended; returns its number.
+    uint32_t endList() {
+        begin.push_back(uint32_t(triangles.size()));
+        return uint32_t(begin.size() - 2);
+    }
+    bool operator==(const LeafLists&) const = default;
+};
+
 struct PageDraft {
     PageHeader header;            ///< all counts but that of entries
     std::vector<uint32_t> nodes;  ///< as in a page, but that the word of a hard leaf (draftLeaf) has its list's number
     std::vector<uint4> faces;
     std::vector<glm::u32vec2> vertices;
     std::vector<uint32_t> normals;
-    std::vector<Index3> triangles;   ///< of all hard leaves, each once, in no order
-    std::vector<uint32_t> lists;     ///< the triangles of list 0, of list 1, and so on
-    std::vector<uint32_t> begin{0};  ///< where in `lists` each begins, and the end
+    std::vector<Index3> triangles;  ///< of all hard leaves, each once, in no order
+    LeafLists lists;
     /// Whether it is certain that each list names all triangles that touch its leaf's closed box, and no others.
     bool listsAreCertain = false;
-
-    [[nodiscard]] std::span<const uint32_t> listOf(uint32_t leaf) const {
-        return std::span(lists).subspan(begin[leaf], begin[leaf + 1] - begin[leaf]);
-    }
 };
 
 /// The word of a hard leaf in a draft, and the number of its list.

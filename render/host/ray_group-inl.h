@@ -19,7 +19,7 @@ struct RayGroup {
     Lane column, row;          // pixels from the tile's middle
     Lane3 direction, inverse;  // no component is 0
     Mask alive;                // rays of the picture without a hit
-    // Of a hit: its distance in finest cells, multiplied with the direction, and what TileHits keeps.
+    // The hit: its distance in finest cells, multiplied with the direction, and what TileHits keeps.
     Lane t, x, y, z, side;
     Lane3 normal;
     LaneWords leaf;

@@ -75,7 +75,7 @@ struct Triangles {
     alignas(32) float reach[8];      // by so much `along` differs in a group from its middle's
     alignas(32) float steep[8];      // the least |along| that is clear
     bool haveNormals;                // normals are found when a ray hits
-    // Of vertex a, and what b's and c's differ from it; on the side of (b - a) x (c - a).
+    // Vertex a's normal, then the differences of b's and c's from it; all on the side of (b - a) x (c - a).
     alignas(32) float normal[3][3][8];
 };
 

@@ -3,28 +3,11 @@
 # usage: embedding_test.sh PREFIX SOURCE WORK CC CXX LIBDIR
 set -euo pipefail
 prefix=$1 source=$2 work=$3 cc=$4 cxx=$5 libdir=$6
+here=$(realpath "$(dirname "$0")")
 rm -rf "$work"
 mkdir -p "$work/docs"
 
-# A mesh to look at: an octahedron.
-cat >"$work/octahedron.off" <<'MESH'
-OFF
-6 8 0
-1 0 0
--1 0 0
-0 1 0
-0 -1 0
-0 0 1
-0 0 -1
-3 0 2 4
-3 2 1 4
-3 1 3 4
-3 3 0 4
-3 2 0 5
-3 1 2 5
-3 3 1 5
-3 0 3 5
-MESH
+cp "$here/octahedron.off" "$work"
 tree=$work/octahedron.vcp
 "$prefix/bin/vcp" build "$work/octahedron.off" -o "$tree" --cell 0.05 --progress none
 

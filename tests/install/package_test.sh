@@ -5,6 +5,7 @@
 set -euo pipefail
 build=$1 source=$2 work=$3 cc=$4
 command -v dpkg >/dev/null && command -v dpkg-deb >/dev/null || { echo "no dpkg"; exit 77; }
+here=$(realpath "$(dirname "$0")")
 rm -rf "$work"
 mkdir -p "$work"
 
@@ -66,24 +67,7 @@ fi
 
 # The program, out of the folder: a mesh, its octree, a picture.
 export PATH=$usr/bin:$PATH
-cat >octahedron.off <<'MESH'
-OFF
-6 8 0
-1 0 0
--1 0 0
-0 1 0
-0 -1 0
-0 0 1
-0 0 -1
-3 0 2 4
-3 2 1 4
-3 1 3 4
-3 3 0 4
-3 2 0 5
-3 1 2 5
-3 3 1 5
-3 0 3 5
-MESH
+cp "$here/octahedron.off" .
 [ "$(command -v vcp)" = "$usr/bin/vcp" ]
 quietly vcp build octahedron.off -o "of eight.vcp" --cell 0.05 --progress none
 quietly vcp verify "of eight.vcp"

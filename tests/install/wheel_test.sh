@@ -8,6 +8,7 @@ for each in "$python" /usr/bin/python3; do
     if "$each" -c 'import numpy, venv, ensurepip' 2>/dev/null; then found=$each; break; fi
 done
 [ -n "${found:-}" ] || { echo "no Python with venv and NumPy"; exit 77; }
+here=$(realpath "$(dirname "$0")")
 rm -rf "$work"
 mkdir -p "$work"
 cmake --build "$build" --target wheel >"$work/wheel.log" 2>&1 || { cat "$work/wheel.log"; exit 1; }
@@ -23,24 +24,7 @@ cmp "$wheel" "$work/first.whl"
 cd "$work"
 venv/bin/python -m pip install --no-index --disable-pip-version-check "$wheel" >pip.log 2>&1 || { cat pip.log; exit 1; }
 unset PYTHONPATH LD_LIBRARY_PATH
-cat >octahedron.off <<'MESH'
-OFF
-6 8 0
-1 0 0
--1 0 0
-0 1 0
-0 -1 0
-0 0 1
-0 0 -1
-3 0 2 4
-3 2 1 4
-3 1 3 4
-3 3 0 4
-3 2 0 5
-3 1 2 5
-3 3 1 5
-3 0 3 5
-MESH
+cp "$here/octahedron.off" .
 cat >use.py <<'PYTHON'
 import ast
 import inspect

@@ -108,7 +108,7 @@ TEST(March, SampledSolidsAreAsLargeAsTheirShapes) {
         if (truth.hit && isHit) behind += found.t - truth.t, ++hits;
     }
     EXPECT_GT(hits, 1000);
-    // Of a cell; without the correction 0.02.
+    // In cells; it is 0.02 without the correction.
     EXPECT_LT(std::abs(behind / hits) * 32, 0.005);
     EXPECT_LE(missed, 2 * falseHits + 4);
 }

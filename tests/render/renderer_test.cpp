@@ -1,6 +1,6 @@
 // The whole renderer against the reference ray-caster, with validation layers on: every test ends with no
 // message.
-#include "render/renderer.h"
+#include "render/view/renderer.h"
 
 #include <algorithm>
 #include <atomic>
@@ -293,7 +293,7 @@ TEST(RendererFeedback, WhatRaysMeetIsReadFirst) {
         const auto read = readInOrder(LoadOrder::Feedback, access, scene, request, messages);
         for (const std::string& message : messages) ADD_FAILURE() << message;
         ASSERT_EQ(read.size(), scene.dataset->pages.size());
-        // Of the finest pages: the rays see those in front.
+        // The finest pages that are read are those in front, which the rays see.
         std::vector<double> front;
         for (const uint64_t page : read)
             if (scene.dataset->pages[page].level == 2)
@@ -434,7 +434,7 @@ TEST_F(RendererTest, ALostDeviceIsMadeAnew) {
     const Scene scene = test::torusScene();
     FrameRequest request = requestOf(cameras(scene)[0].camera, 64, 48);
     request.beam = false;
-    // Of pipelines, which take most of the time here, the fewest.
+    // Options with the fewest pipelines, which take most of the time here.
     RendererOptions options;
     options.order = LoadOrder::Error;
     start(options);

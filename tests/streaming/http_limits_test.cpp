@@ -35,7 +35,7 @@ protected:
     std::unique_ptr<test::RangeServer> server_;
 };
 
-// Of servers that would take half a minute and more.
+// Gives up early on servers that would take half a minute and more.
 const HttpOptions kImpatient{.stallSeconds = 0.3, .leastBytesPerSecond = 10'000};
 
 TEST_F(HttpLimits, SlowAnswersAreTimeOuts) {

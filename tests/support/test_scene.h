@@ -13,7 +13,7 @@
 #include <gtest/gtest.h>
 
 #include "octree/reference_caster.h"
-#include "render/renderer.h"
+#include "render/view/renderer.h"
 #include "tests/support/analytic_page.h"
 #include "tests/support/soup_page.h"
 

@@ -15,7 +15,7 @@
 #include <gtest/gtest.h>
 
 #include "render/picture.h"
-#include "render/renderer.h"
+#include "render/view/renderer.h"
 #include "tests/support/vcp_program.h"
 
 namespace vcp {

@@ -309,8 +309,7 @@ Command addCompare(CLI::App& vcp) {
     addParsed(*app, "--error", command->error, parseLength, "like 0.25 or 0.01%",
               "Take of .vcp files the coarsest level within this distance [the finest]: surfaces are held in memory")
         ->type_name("LENGTH");
-    addParsed(*app, "--unit", command->unit, unitNamed, "um, mm, cm, m, km, in or ft", "What one unit of the files is")
-        ->type_name("UNIT");
+    addUnit(*app, command->unit, "What one unit of the files is");
     addSize(*app, command->size, "1600x1000", "Width and height of the picture in pixels")
         ->default_str(sizeText(command->size));
     addCameraSettings(*app, command->render);

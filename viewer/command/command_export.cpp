@@ -223,9 +223,7 @@ Command addExport(CLI::App& vcp) {
     addParsed(*app, "--box", command->box, parseBox, "like 0,0,0,1,1,1, a corner and the opposite one",
               "Only triangles whose centre lies in a box: boxes side by side share none")
         ->type_name("X,Y,Z,X,Y,Z");
-    addParsed(*app, "--unit", command->unit, unitNamed, "um, mm, cm, m, km, in or ft",
-              "What one unit of the file is: drawings get it, and their true size [unknown]")
-        ->type_name("UNIT");
+    addUnit(*app, command->unit, "What one unit of the file is: drawings get it, and their true size [unknown]");
     app->add_flag("--colour,!--no-colour", command->colour, "Write colours where the file has them [on]");
     app->add_option("--threads", command->threads, "Threads that read [one a processor]")
         ->type_name("N")

@@ -71,7 +71,7 @@ struct Drawing {
     uint32_t samples = 1;
     double samplesMs = 0;  ///< time of all samples of the picture together
 
-    /// Of the timed frames; of the first when none was timed.
+    /// Returns the median of the timed frames, or the time of the first where none was timed.
     [[nodiscard]] double medianMs() const { return frameMs.empty() ? firstFrameMs : upperQuantile(frameMs, 0.5); }
     [[nodiscard]] double raysPerSecond() const { return double(stats.rays) / std::max(1e-3 * medianMs(), 1e-9); }
 };

@@ -27,6 +27,10 @@ CLI::Option* addCell(CLI::App& app, double& cell) {
         ->type_name("LENGTH");
 }
 
+CLI::Option* addUnit(CLI::App& app, std::optional<LengthUnit>& unit, const std::string& description) {
+    return addParsed(app, "--unit", unit, unitNamed, "um, mm, cm, m, km, in or ft", description)->type_name("UNIT");
+}
+
 CLI::Option* addMemory(CLI::App& app, uint64_t& bytes, const std::string& description) {
     const auto parse = [](const std::string& text) { return parseMemory(text, 2 * defaultMemoryBytes()); };
     return addParsed(app, "--memory", bytes, parse, "like 512M, 4G or 50%", description)->type_name("BYTES");

@@ -3,11 +3,14 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include <CLI/CLI.hpp>
 #include <glm/vec2.hpp>
+
+#include "viewer/export/section_export.h"
 
 namespace vcp {
 
@@ -53,6 +56,9 @@ CLI::Option* addBudget(CLI::App& app, const std::string& name, uint64_t& bytes, 
 
 /// Adds --cell, a length in world units.
 CLI::Option* addCell(CLI::App& app, double& cell);
+
+/// Adds --unit, which names what one unit of a file is.
+CLI::Option* addUnit(CLI::App& app, std::optional<LengthUnit>& unit, const std::string& description);
 
 /// Adds --memory, bytes or a part of the machine's.
 CLI::Option* addMemory(CLI::App& app, uint64_t& bytes, const std::string& description);

@@ -77,7 +77,7 @@ Result<MeshExportFigures> exportMesh(const ByteReader& reader, const SurfaceCut&
                                            [&](std::span<const Facet> facets) { return file.addFacets(facets); })
                             : streamMesh(reader, cut, options.stream, file);
     MeshExportFigures figures{.rounding = positions.rounding, .isDouble = positions.isDouble};
-    // Of facets it is known at the end.
+    // The count of vertices of facets is known only at the end.
     const auto checked = format->takesFacets() && totals ? file.endVertices(*totals) : Result<void>();
     figures.isTooCoarse = file.isTooCoarse();
     if (figures.isTooCoarse) return figures;

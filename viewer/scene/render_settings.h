@@ -11,7 +11,7 @@
 
 #include "octree/io/result.h"
 #include "octree/page/paper_page.h"
-#include "render/renderer.h"
+#include "render/view/renderer.h"
 #include "viewer/camera/orbit_camera.h"
 #include "viewer/scene/option_values.h"
 #include "viewer/scene/scene_opening.h"

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "octree/io/result.h"
-#include "render/renderer.h"
+#include "render/view/renderer.h"
 #include "viewer/camera/orbit_camera.h"
 #include "viewer/scene/meso_scene.h"
 

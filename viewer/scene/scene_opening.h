@@ -13,7 +13,7 @@
 #include <thread>
 #include <vector>
 
-#include "render/renderer.h"
+#include "render/view/renderer.h"
 #include "streaming/page_source.h"
 #include "viewer/scene/inputs.h"
 #include "viewer/scene/scene_file.h"

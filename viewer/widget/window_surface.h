@@ -1,7 +1,7 @@
 // Makes Vulkan surfaces of the host's windows.
 #pragma once
 
-#include "render/renderer.h"
+#include "render/view/renderer.h"
 #include "viewer/widget/vcp.h"
 
 namespace vcp::widget {

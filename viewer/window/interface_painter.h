@@ -15,7 +15,7 @@
 
 #include "octree/io/result.h"
 #include "render/picture.h"
-#include "render/renderer.h"
+#include "render/view/renderer.h"
 #include "viewer/window/theme.h"
 
 struct ImDrawData;

@@ -58,7 +58,7 @@ TEST(MeshOf, OneOfTheRepeatedStaysWithTheLargestStray) {
     const glm::i32vec3 a{0, 0, 0}, b{9, 0, 0}, c{0, 9, 0};
     const std::vector<LatticeTriangle> copies{triangle(c, b, a, 1), triangle(a, b, c, 2), triangle(b, c, a, 5),
                                               triangle(b, a, c, 3)};
-    // Of the two orientations the one that ascends, whichever comes first.
+    // The orientation that ascends is kept, whichever comes first.
     for (size_t first = 0; first < copies.size(); ++first) {
         std::vector<LatticeTriangle> soup = copies;
         std::rotate(soup.begin(), soup.begin() + ptrdiff_t(first), soup.end());

@@ -121,7 +121,7 @@ TEST(PageCodec, ADraftIsItsPage) {
     for (const uint32_t seed : {1u, 2u, 3u}) {
         const WholePage page = withLeavesOfAllKinds(soup(seed, 2, 3, 20, 10).build(seed), seed);
         PageDraft draft = draftOf(page.view());
-        EXPECT_EQ(draft.lists.size(), draft.begin.back());
+        EXPECT_EQ(draft.lists.triangles.size(), draft.lists.begin.back());
         const std::vector<std::byte> whole = pageOf(draft);
         const auto view = parsePage(whole, asBytes(page.colour));
         ASSERT_TRUE(view.ok()) << view.error().line();

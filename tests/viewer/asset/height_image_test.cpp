@@ -103,7 +103,7 @@ private:
         put<uint32_t>(out, uint32_t(value.size()));
         for (const std::byte byte : value) out.push_back(byte);
     }
-    /// Of values that a half holds.
+    /// Returns the bits of a half; `value` must be one that a half holds.
     static uint16_t halfOf(float value) {
         uint32_t bits = 0;
         std::memcpy(&bits, &value, sizeof bits);
@@ -279,7 +279,7 @@ TEST_F(Exr, APictureIsNotLargerThanItsBytesCanHold) {
 }
 
 TEST_F(Exr, OtherAttributesArePassedOver) {
-    // Of sizes that their types do not have, which a reader by type would take for what follows.
+    // Their sizes are not those of their types: a reader that goes by type would take other bytes for what follows.
     for (const auto& [type, size] :
          {std::pair("string", size_t{40}), std::pair("int", size_t{0}), std::pair("m44f", size_t{3}),
           std::pair("stringvector", size_t{12}), std::pair("preview", size_t{8}), std::pair("of mine", size_t{5})}) {

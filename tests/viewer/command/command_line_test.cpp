@@ -16,7 +16,7 @@
 #include <nlohmann/json.hpp>
 
 #include "render/picture.h"
-#include "render/renderer.h"
+#include "render/view/renderer.h"
 #include "tests/support/range_server.h"
 #include "tests/support/vcp_program.h"
 

@@ -249,7 +249,7 @@ TEST_F(MesoCommands, BenchHasTheFieldsThatProgramsRelyOn) {
         methods.insert(row["method"]);
     }
     EXPECT_EQ(methods.size(), 3u);
-    // Of needle's rays and beads' by eight maps each.
+    // Two checks (the rays of needle and of beads) for each of eight maps.
     EXPECT_EQ(report["checks"].size(), 16u);
     for (const Json& check : report["checks"]) {
         EXPECT_TRUE(check["map"] == "4x1 paper" || check["oversteps"] == 0) << check;

@@ -55,7 +55,7 @@ TEST(TerminalText, JsonKeepsItsMeaning) {
     }
 }
 
-/// Of any bytes: UTF-8 without a control character, and the same when it is escaped again.
+/// Any bytes become UTF-8 without a control character, which stays the same when it is escaped again.
 TEST(TerminalText, AnyBytes) {
     for (uint32_t seed = 0; seed < 2000; ++seed) {
         std::mt19937 random(seed);

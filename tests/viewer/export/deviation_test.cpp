@@ -135,7 +135,7 @@ TEST(DeviationPicture, ShowsTheSurfaceInItsColours) {
     const glm::dvec3 red = 255.0 * divergingColour(1);
     for (int c = 0; c < 3; ++c) EXPECT_NEAR(at(80, 100)[c], red[c], 2);
     EXPECT_EQ(at(2, 2), glm::ivec3(255));
-    // Of the scale, its bar has both ends, and something is written.
+    // The scale's bar has both ends, and something is written beside it.
     bool hasBlue = false, hasInk = false;
     for (uint32_t y = 0; y < 200; ++y)
         for (uint32_t x = 320 - scaleWidth(320); x < 320; ++x) {

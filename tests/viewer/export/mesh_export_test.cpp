@@ -1,4 +1,5 @@
 // Meshes that come back from a dataset: the mesh itself from the finest level, and from others what is certified.
+#include <limits>
 #include <set>
 
 #include "tests/support/mesh_reading.h"
@@ -13,6 +14,21 @@ IndexedMesh torus() { return torusMesh({0.3, -0.2, 0.1}, 1, 0.4, 160, 60); }
 const ExportedMesh& builtTorus() {
     static const ExportedMesh built("torus", torus(), {.cell = 0.02});
     return built;
+}
+
+/// Expects each level's export and the mesh within the certified distance of each other, and that distance within
+/// `factor` of what is certified of the picture: the polygons then stand for the surface about as well as that.
+void expectLevelsAreNear(const ExportedMesh& built, double factor = std::numeric_limits<double>::infinity()) {
+    const MeshBvh truth(built.mesh());
+    for (uint32_t level = 0; level < built.levels(); ++level) {
+        SCOPED_TRACE(level);
+        const SurfaceCut cut = built.cut(level);
+        const MeshExportFigures figures = built.write("level.ply", cut);
+        const IndexedMesh out = built.read("level.ply");
+        EXPECT_LE(farthestFrom(truth, out), figures.certified);
+        EXPECT_LE(farthestFrom(MeshBvh(out), built.mesh()), figures.certified);
+        EXPECT_LE(figures.certified, factor * cut.certifiedError() + figures.rounding);
+    }
 }
 
 TEST(MeshExport, FinestLevelIsTheMeshAndClosed) {
@@ -61,18 +77,8 @@ TEST(MeshExport, StlHasEachTriangleOnce) {
 
 TEST(MeshExport, EveryLevelIsAsNearAsItSays) {
     const ExportedMesh& built = builtTorus();
-    const MeshBvh truth(built.mesh());
     ASSERT_GE(built.levels(), 3u);
-    for (uint32_t level = 0; level < built.levels(); ++level) {
-        SCOPED_TRACE(level);
-        const SurfaceCut cut = built.cut(level);
-        const MeshExportFigures figures = built.write("level.ply", cut);
-        const IndexedMesh out = built.read("level.ply");
-        EXPECT_LE(farthestFrom(truth, out), figures.certified);
-        EXPECT_LE(farthestFrom(MeshBvh(out), built.mesh()), figures.certified);
-        // The polygons stand for the surface about as well as what is drawn of it.
-        EXPECT_LE(figures.certified, 1.5 * cut.certifiedError() + figures.rounding);
-    }
+    expectLevelsAreNear(built, 1.5);
 }
 
 TEST(MeshExport, SlabsOfThinAndFoldedSheetsAreAsNearAsTheySay) {
@@ -80,14 +86,7 @@ TEST(MeshExport, SlabsOfThinAndFoldedSheetsAreAsNearAsTheySay) {
     rotate(mesh, {0, 0, 0}, {1, 2, 3}, 0.7);
     append(mesh, randomTriangles(300, 7, true));
     const ExportedMesh built("thin", mesh, {.cell = 0.03});
-    const MeshBvh truth(built.mesh());
-    for (uint32_t level = 0; level < built.levels(); ++level) {
-        SCOPED_TRACE(level);
-        const MeshExportFigures figures = built.write("level.ply", built.cut(level));
-        const IndexedMesh out = built.read("level.ply");
-        EXPECT_LE(farthestFrom(truth, out), figures.certified);
-        EXPECT_LE(farthestFrom(MeshBvh(out), mesh), figures.certified);
-    }
+    expectLevelsAreNear(built);
 }
 
 TEST(MeshExport, SoftLeavesAreAsNearAsTheySay) {
@@ -95,16 +94,7 @@ TEST(MeshExport, SoftLeavesAreAsNearAsTheySay) {
         SCOPED_TRACE(error);
         const ExportedMesh built(error > 0 ? "soft" : "clustered", torusMesh({0, 0, 0}, 1, 0.4, 80, 30),
                                  {.cell = 0.05, .error = error, .leaves = CoarseLeaves::Mesh});
-        const MeshBvh truth(built.mesh());
-        for (uint32_t level = 0; level < built.levels(); ++level) {
-            SCOPED_TRACE(level);
-            const SurfaceCut cut = built.cut(level);
-            const MeshExportFigures figures = built.write("level.ply", cut);
-            const IndexedMesh out = built.read("level.ply");
-            EXPECT_LE(farthestFrom(truth, out), figures.certified);
-            EXPECT_LE(farthestFrom(MeshBvh(out), built.mesh()), figures.certified);
-            EXPECT_LE(figures.certified, 1.5 * cut.certifiedError() + figures.rounding);
-        }
+        expectLevelsAreNear(built, 1.5);
     }
 }
 
@@ -120,14 +110,7 @@ TEST(MeshExport, PartedPagesMeetAndMix) {
     built.write("finest.ply", built.cut());
     const IndexedMesh finest = built.read("finest.ply");
     EXPECT_TRUE(isClosed(finest));
-    const MeshBvh truth(mesh);
-    for (uint32_t level = 0; level < built.levels(); ++level) {
-        SCOPED_TRACE(level);
-        const MeshExportFigures figures = built.write("level.ply", built.cut(level));
-        const IndexedMesh out = built.read("level.ply");
-        EXPECT_LE(farthestFrom(truth, out), figures.certified);
-        EXPECT_LE(farthestFrom(MeshBvh(out), mesh), figures.certified);
-    }
+    expectLevelsAreNear(built);
 }
 
 TEST(MeshExport, BytesDoNotDependOnThreadsOrTables) {

@@ -9,7 +9,7 @@
 #include <glm/geometric.hpp>
 
 #include "render/picture.h"
-#include "render/renderer.h"
+#include "render/view/renderer.h"
 #include "viewer/bench/picture/flip.h"
 #include "viewer/bench/picture/mesh_picture.h"
 #include "viewer/bench/picture/picture_difference.h"

@@ -14,7 +14,7 @@
 #include "builder/paper/parallel_rows.h"
 #include "octree/reference_caster.h"
 #include "render/camera.h"
-#include "render/renderer.h"
+#include "render/view/renderer.h"
 #include "streaming/page_source.h"
 #include "viewer/bench/rays/analytic_models.h"
 

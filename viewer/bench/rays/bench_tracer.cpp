@@ -11,7 +11,7 @@
 
 #include "builder/measure/quantile.h"
 #include "builder/paper/parallel_rows.h"
-#include "render/renderer.h"
+#include "render/view/renderer.h"
 #include "streaming/page_source.h"
 
 namespace vcp {

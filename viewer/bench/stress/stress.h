@@ -16,7 +16,7 @@
 
 #include "builder/measure/ray_classes.h"
 #include "octree/io/result.h"
-#include "render/renderer.h"
+#include "render/view/renderer.h"
 #include "streaming/faulty_reader.h"
 #include "viewer/bench/stress/stress_orders.h"
 #include "viewer/bench/stress/stress_views.h"

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "octree/io/result.h"
-#include "render/renderer.h"
+#include "render/view/renderer.h"
 #include "viewer/scene/scene_opening.h"
 
 namespace vcp {

@@ -413,7 +413,7 @@ TEST(GltfMeshopt, CountsAreCheckedAgainstTheBytesBeforeAnythingIsAllocated) {
     const std::string indices = claim(65536, 4, "INDICES", std::string(65536, '\xD0'), 65536).embedded();
     EXPECT_NE(lineOf(indices).find("cannot hold"), std::string::npos) << lineOf(indices);
 
-    // Of constant values as many are read as one byte may stand for; and not with less memory than they need.
+    // One byte may stand for many equal values: these are read, but not with less memory than they need.
     const std::string flat = claim(65536, 16, "ATTRIBUTES", ofVertices(std::string(1 << 20, '\1'), 16), 0).embedded();
     EXPECT_FALSE(read(flat).error) << read(flat).line();
     MeshOpenOptions options;

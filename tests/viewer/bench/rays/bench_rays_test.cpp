@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "render/renderer.h"
+#include "render/view/renderer.h"
 #include "tests/support/test_meshes.h"
 #include "tests/support/vcp_program.h"
 #include "viewer/bench/rays/analytic_models.h"

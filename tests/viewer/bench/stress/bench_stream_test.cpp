@@ -26,7 +26,7 @@ protected:
         return VcpProgram(folder_).runWords("bench stream " + arguments);
     }
 
-    /// Of a line of CSV.
+    /// Counts the columns of a line of CSV.
     static long columns(const std::string& line) {
         bool isQuoted = false;
         return 1 + std::count_if(line.begin(), line.end(), [&](char c) {

@@ -6,7 +6,7 @@
 
 #include "render/frame_setup.h"
 #include "render/pixel_samples.h"
-#include "render/renderer_view.h"
+#include "render/view/renderer_view.h"
 
 namespace vcp {
 
@@ -90,14 +90,9 @@ std::optional<PixelHit> Renderer::View::castHit(const Frame& frame, PicturePixel
     const HostPicture& picture = frame.cast->picture;
     const size_t at = size_t{pixel.y} * frame.request.width + pixel.x;
     if (picture.hits[at].dataset == HostHit().dataset) return {};
-    const PictureTile whole = wholePicture(frame.request);
-    const glm::dvec2 point = upperLeft(frame.request) + glm::dvec2(pixel.x, pixel.y) + 0.5;
-    const CameraRay ray = cameraRay(frame.request.camera, whole.fullWidth, whole.fullHeight, point.x, point.y);
-    const double depth = double(picture.depth[at]);
-    return PixelHit{.depth = depth,
-                    .position = ray.origin + ray.direction * depth,
-                    .normal = picture.normals[at],
-                    .dataset = picture.hits[at].dataset};
+    PixelHit hit = pixelHit(frame.request, pixel, double(picture.depth[at]), picture.normals[at]);
+    hit.dataset = picture.hits[at].dataset;
+    return hit;
 }
 
 }  // namespace vcp

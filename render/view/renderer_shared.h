@@ -1,7 +1,7 @@
 // What the views of a renderer share: device, passes, and the datasets with their pages.
 #pragma once
 
-#include "render/renderer.h"
+#include "render/view/renderer.h"
 
 #include <utility>
 

@@ -1,10 +1,10 @@
-#include "render/renderer.h"
+#include "render/view/renderer.h"
 
 #include <chrono>
 #include <limits>
 
 #include "render/frame_setup.h"
-#include "render/renderer_view.h"
+#include "render/view/renderer_view.h"
 #include "render/vulkan/check.h"
 
 namespace vcp {

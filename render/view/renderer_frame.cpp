@@ -7,7 +7,7 @@
 #include <glm/geometric.hpp>
 
 #include "render/frame_setup.h"
-#include "render/renderer_view.h"
+#include "render/view/renderer_view.h"
 #include "render/vulkan/compute_pipeline.h"
 
 namespace vcp {

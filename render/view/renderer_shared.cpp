@@ -5,7 +5,7 @@
 
 #include <fmt/format.h>
 
-#include "render/renderer_view.h"
+#include "render/view/renderer_view.h"
 
 namespace vcp {
 

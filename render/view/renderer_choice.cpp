@@ -1,6 +1,6 @@
 // Which renderer draws pictures.
 #include "render/host_renderer.h"
-#include "render/renderer.h"
+#include "render/view/renderer.h"
 
 namespace vcp {
 

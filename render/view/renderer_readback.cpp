@@ -9,7 +9,7 @@
 
 #include "render/frame_setup.h"
 #include "render/passes/readback.h"
-#include "render/renderer_view.h"
+#include "render/view/renderer_view.h"
 
 namespace vcp {
 
@@ -194,14 +194,9 @@ Result<std::optional<PixelHit>> Renderer::View::pick(PicturePixel pixel) {
 
 std::optional<PixelHit> Renderer::View::nearestHit(const FrameRequest& request, PicturePixel pixel,
                                                    std::span<const HitWords> words, const MesoReport& surfaces) const {
-    const PictureTile whole = wholePicture(request);
-    const glm::dvec2 at = upperLeft(request) + glm::dvec2(pixel.x, pixel.y) + 0.5;
-    const CameraRay ray = cameraRay(request.camera, whole.fullWidth, whole.fullHeight, at.x, at.y);
-    const auto hitAt = [&](double depth, glm::vec3 normal) {
-        return PixelHit{.depth = depth, .position = ray.origin + ray.direction * depth, .normal = normal};
-    };
     if (surfaces.cursorNormal != 0) {
-        PixelHit hit = hitAt(double(std::bit_cast<float>(surfaces.cursorDepth)), unpackNormal(surfaces.cursorNormal));
+        PixelHit hit = pixelHit(request, pixel, double(std::bit_cast<float>(surfaces.cursorDepth)),
+                                unpackNormal(surfaces.cursorNormal));
         hit.onSurface = true;
         return hit;
     }
@@ -212,7 +207,8 @@ std::optional<PixelHit> Renderer::View::nearestHit(const FrameRequest& request, 
         if (layers[i].residency == nullptr || isEmpty || cells >= frame::kNoHit) continue;
         const double depth = double(cells) * layers[i].unit();
         if (nearest && nearest->depth <= depth) continue;
-        nearest = hitAt(depth, glm::quat(layers[i].placement.rotation) * unpackNormal(words[i].normal));
+        const glm::vec3 normal = glm::quat(layers[i].placement.rotation) * unpackNormal(words[i].normal);
+        nearest = pixelHit(request, pixel, depth, normal);
         nearest->dataset = i;
         nearest->onCap = std::signbit(std::bit_cast<float>(words[i].depth));
     }

@@ -5,7 +5,7 @@
 
 #include "render/frame_setup.h"
 #include "render/pixel_samples.h"
-#include "render/renderer_view.h"
+#include "render/view/renderer_view.h"
 
 namespace vcp {
 

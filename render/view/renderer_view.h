@@ -14,8 +14,8 @@
 #include "render/host_drawing.h"
 #include "render/picture_parts.h"
 #include "render/picture_scaling.h"
-#include "render/renderer_shared.h"
 #include "render/swapchain.h"
+#include "render/view/renderer_shared.h"
 #include "render/vulkan/pass_timer.h"
 
 namespace vcp {

@@ -1,5 +1,5 @@
 // Renderer: the life of a view.
-#include "render/renderer_view.h"
+#include "render/view/renderer_view.h"
 
 #include <algorithm>
 #include <limits>
