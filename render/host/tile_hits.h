@@ -28,7 +28,8 @@ struct TileHits {
     bool any = false;                        ///< false: no ray hit, and nothing below is written
     alignas(32) float depth[kTilePixels];    ///< world units; infinite where a ray hit nothing
     alignas(32) uint32_t leaf[kTilePixels];  ///< element of `leaves`; undefined where a ray hit nothing
-    /// The hit in leaf space where a soft leaf is hit; else the weights of the triangle's second and third vertex, and 0.
+    /// The hit in leaf space where a soft leaf is hit; else the weights of the triangle's second and third vertex, and
+    /// 0.
     alignas(32) float x[kTilePixels], y[kTilePixels], z[kTilePixels];
     /// A number with the sign of the side that the ray came from (sideBefore in shared/leaf_math.h); soft leaves only.
     alignas(32) float side[kTilePixels];

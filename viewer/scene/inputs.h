@@ -16,8 +16,8 @@ enum class InputKind { Scene, Datasets, Meshes };
 Result<InputKind> kindOf(const std::vector<std::string>& inputs);
 
 /// Returns the .vcp to show for `inputs`: the input itself when it is one, else the mesh built into the default cache.
-/// The inputs and the output in `build` are ignored. Any thread. Errors: those of MeshCache. Precondition: one .vcp or address,
-/// or meshes.
+/// The inputs and the output in `build` are ignored. Any thread. Errors: those of MeshCache. Precondition: one .vcp or
+/// address, or meshes.
 Result<std::filesystem::path> datasetFor(const std::vector<std::string>& inputs, BuildOptions build);
 
 /// Returns the files that meshes named in datasetFor: material files, images, buffers. None for other inputs.
