@@ -17,7 +17,11 @@ namespace {
 
 // Bytes of a triangle on the temporary disk (the soup while it is dealt, then the finest level's bins with what has
 // been built of it) and in the file (2.4 to 3.2 for scans, 4.7 with colour), and its time on one thread.
-constexpr double kTempBytesPerTriangle = 75, kFileBytesPerTriangle = 5, kSecondsPerTriangle = 5e-6;
+constexpr double kTempBytesPerTriangle = 100, kFileBytesPerTriangle = 5, kSecondsPerTriangle = 5e-6;
+// Bytes of a triangle in memory where there is room for all, 120 to 195 for scans, and what comes with the first ones.
+constexpr double kMemoryBytesPerTriangle = 200, kFirstMemoryBytes = 20e6;
+// A machine may be slower by so much than the one that the time was measured on.
+constexpr double kSlower = 4;
 
 /// Measures one input's triangles as far as their vertices fit memory.
 class Measurer {
@@ -81,8 +85,8 @@ uint64_t freeBytesAt(const std::filesystem::path& path) {
 Result<BuildEstimate> estimateBuild(const BuildOptions& options) {
     BuildEstimate estimate;
     const unsigned threads = options.threads > 0 ? options.threads : std::max(1u, std::thread::hardware_concurrency());
-    estimate.memoryBytes = options.memoryBytes > 0 ? options.memoryBytes : defaultMemoryBytes();
-    VCP_TRY_ASSIGN(auto plan, planMemory(estimate.memoryBytes, threads));
+    estimate.memoryCap = options.memoryBytes > 0 ? options.memoryBytes : defaultMemoryBytes();
+    VCP_TRY_ASSIGN(auto plan, planMemory(estimate.memoryCap, threads));
     SoupMeasures& m = estimate.measures;
     m.boundsMin = glm::dvec3(std::numeric_limits<double>::infinity());
     m.boundsMax = -m.boundsMin;
@@ -114,9 +118,14 @@ Result<BuildEstimate> estimateBuild(const BuildOptions& options) {
     m.area *= double(m.triangles) / double(measured);
     m.length *= double(m.triangles) / double(measured);
     VCP_TRY_ASSIGN(estimate.frame, chooseFrame(options, m));
-    estimate.tempBytes = expectedTempBytes(m.triangles, plan.tempBytes);
+    estimate.memoryBytes =
+        std::min(estimate.memoryCap, fixedMemoryBytes(threads) +
+                                         uint64_t(kFirstMemoryBytes + kMemoryBytesPerTriangle * double(m.triangles)));
     estimate.fileBytes = expectedFileBytes(m.triangles);
     estimate.seconds = kSecondsPerTriangle * double(m.triangles) / threads;
+    // A checkpoint writes all that is held in memory.
+    const bool mayCheckpoint = kSlower * estimate.seconds > options.checkpointSeconds;
+    estimate.tempBytes = expectedTempBytes(m.triangles, mayCheckpoint ? 0 : plan.tempBytes);
     estimate.freeTempBytes = freeBytesAt(tempFolderOf(options));
     estimate.freeOutputBytes = freeBytesAt(options.output);
     return estimate;

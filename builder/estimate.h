@@ -13,8 +13,9 @@ struct BuildEstimate {
     SoupMeasures measures;  ///< area counts only triangles whose vertices fit memory
     bool isAreaComplete = true;
     GridFrame frame;
-    uint64_t memoryBytes = 0;  ///< a sufficient memory cap
-    uint64_t tempBytes = 0;    ///< most bytes on the temporary disk at one time; 0: everything fits memory
+    uint64_t memoryBytes = 0;  ///< most bytes that the build will take
+    uint64_t memoryCap = 0;    ///< most bytes that it may take
+    uint64_t tempBytes = 0;    ///< most bytes on the temporary disk at one time; 0: it will write nothing there
     uint64_t fileBytes = 0;
     double seconds = 0;
     uint64_t freeTempBytes = 0, freeOutputBytes = 0;  ///< free bytes on the disks they would go to

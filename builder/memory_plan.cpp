@@ -37,8 +37,10 @@ uint64_t defaultMemoryBytes() {
     return std::min(machine, groupLimit()) / 2;
 }
 
+uint64_t fixedMemoryBytes(unsigned threads) { return kBaseBytes + threads * kThreadBytes; }
+
 Result<MemoryPlan> planMemory(uint64_t memoryBytes, unsigned threads) {
-    const uint64_t fixed = kBaseBytes + threads * kThreadBytes;
+    const uint64_t fixed = fixedMemoryBytes(threads);
     if (memoryBytes < fixed + kLeastUsable)
         return Error{
             .code = ErrorCode::Limit,

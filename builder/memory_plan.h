@@ -19,6 +19,9 @@ struct MemoryPlan {
 /// Returns half of the machine's memory, or of the control group's limit when that is less.
 uint64_t defaultMemoryBytes();
 
+/// Returns the bytes that a build takes whatever its input: the program, its readers and its threads.
+uint64_t fixedMemoryBytes(unsigned threads);
+
 /// Divides the memory. Errors: Limit (too little to work with; the message says how much is needed).
 Result<MemoryPlan> planMemory(uint64_t memoryBytes, unsigned threads);
 

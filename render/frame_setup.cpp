@@ -10,6 +10,7 @@
 #include <glm/geometric.hpp>
 #include <glm/vector_relational.hpp>
 
+#include "render/false_colours.h"
 #include "render/pixel_samples.h"
 
 namespace vcp {
@@ -132,8 +133,6 @@ bool hasLight(const Shading& shading) {
     return (shading.mode == ShadingMode::Lit || shading.mode == ShadingMode::Clay) &&
            (shading.shadows || shading.occlusionRays > 0);
 }
-
-bool isFalseColour(ShadingMode mode) { return shadingMode(mode) >= frame::kShadeSteps; }
 
 uint32_t hitPlanes(const FrameRequest& request, bool colour) {
     return 2 + (colour ? 1 : 0) + (hasLight(request.shading) || isFalseColour(request.shading.mode) ? 1 : 0);

@@ -24,9 +24,6 @@ LightDirections lightDirections(const FrameRequest& request, const CameraBasis& 
 /// Whether rays of light are traced: where shading asks for them and shows light.
 bool hasLight(const Shading& shading);
 
-/// Whether pixels show a number of their ray.
-bool isFalseColour(ShadingMode mode);
-
 /// Words that a pixel's hit takes: depth, normal, and where wanted colour, and light or the value of a false colour.
 uint32_t hitPlanes(const FrameRequest& request, bool colour);
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "render/false_colours.h"
 #include "render/frame_setup.h"
 
 namespace vcp {

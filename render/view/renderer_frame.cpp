@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 #include <glm/geometric.hpp>
 
+#include "render/false_colours.h"
 #include "render/frame_setup.h"
 #include "render/view/renderer_view.h"
 #include "render/vulkan/compute_pipeline.h"

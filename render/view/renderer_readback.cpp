@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "render/false_colours.h"
 #include "render/frame_setup.h"
 #include "render/passes/readback.h"
 #include "render/view/renderer_view.h"
@@ -105,9 +106,7 @@ Result<std::vector<uint32_t>> Renderer::readWork() {
     if (!frame || !showsWork((*frame)->request.shading.mode))
         return Error{.code = ErrorCode::Usage, .message = "the last picture does not show work"};
     const ShadingMode mode = (*frame)->request.shading.mode;
-    const float most = mode == ShadingMode::Steps   ? frame::kMostShownSteps
-                       : mode == ShadingMode::Cells ? frame::kMostShownCells
-                                                    : frame::kMostShownFetches;
+    const auto most = float(falseColourEnd(mode));
     std::vector<uint32_t> work;
     for (const View::LayerFrame& layer : (*frame)->layers) {
         const auto words = view_->hitPlane(layer, hitPlanes(layer.request, layer.constants.colour) - 1, 0);

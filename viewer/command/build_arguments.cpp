@@ -6,6 +6,7 @@
 #include <fmt/ranges.h>
 
 #include "builder/mesh/open_mesh.h"
+#include "viewer/command/help_text.h"
 #include "viewer/command/interrupt.h"
 #include "viewer/command/parsed_option.h"
 #include "viewer/scene/option_values.h"
@@ -44,7 +45,8 @@ void addError(CLI::App& app, BuildOptions& options) {
 
 }  // namespace
 
-void addBuildSettings(CLI::App& app, BuildOptions& options) {
+void addBuildSettings(CLI::App& app, BuildOptions& options, const char* group) {
+    const ScopedGroup scope(app, group);
     addCell(app, options.cell);
     addError(app, options);
     addParsed(app, "--colour,--color", options.colour, colourNamed, "auto, vertex, texture or none",
@@ -55,6 +57,7 @@ void addBuildSettings(CLI::App& app, BuildOptions& options) {
               "What coarser levels are made of: slabs (one plane a cell) or mesh (triangles of clustered vertices, and "
               "vectors at corners where they suffice; always with --error)")
         ->type_name("KIND:{slabs,mesh}")
+        ->group(help_group::kMeasuring)
         ->default_str(options.coarseLeaves == CoarseLeaves::Slabs ? "slabs" : "mesh");
     app.add_option("--threads", options.threads, "Threads that build [one a processor]")
         ->type_name("N")
@@ -63,8 +66,7 @@ void addBuildSettings(CLI::App& app, BuildOptions& options) {
                    fmt::format("Format of meshes whose content does not tell it: {}", fmt::join(meshFormats(), ", ")))
         ->type_name("NAME")
         ->check(CLI::IsMember(std::vector<std::string>(meshFormats().begin(), meshFormats().end()), CLI::ignore_case));
-    addMemory(app, options.memoryBytes,
-              "Cap on the memory that the build allocates: 512M, 4G, 50% [half of the machine's]");
+    addMemory(app, options.memoryBytes, "Memory that the build may take: 512M, 4G, 50% [half of the machine's]");
     const auto folder = [](const std::string& name) { return std::optional(std::filesystem::path(name)); };
     addParsed(app, "--temp", options.temp, folder, "a folder", "Folder for temporary files [that of the output]")
         ->type_name("DIR")

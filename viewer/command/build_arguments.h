@@ -12,8 +12,8 @@
 
 namespace vcp {
 
-/// Adds what a person may say of a build, beside its inputs and output.
-void addBuildSettings(CLI::App& app, BuildOptions& options);
+/// Adds what a person may say of a build, beside its inputs and output, to a group of help_text.h.
+void addBuildSettings(CLI::App& app, BuildOptions& options, const char* group);
 
 /// Returns what a display shows of a build.
 ProgressDetails detailsOf(const BuildProgress& at);

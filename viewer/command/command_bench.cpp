@@ -359,7 +359,7 @@ RunCommand addBenchStream(CLI::App& bench) {
                     ".vcp files, their http(s) addresses, or meshes [a sphere, a torus and a thin plate]")
         ->type_name("");
     addParsedList(*app, "--budgets", command->budgets, parseBudget, "at least 1M, like 64M or 1G",
-                  "Memory for subvolumes on the device")
+                  "Memory of the device that detail may take")
         ->type_name("N,N")
         ->delimiter(',')
         ->default_str("64M,256M,1G");
@@ -375,7 +375,7 @@ RunCommand addBenchStream(CLI::App& bench) {
         ->check(CLI::Range(1, 1'000'000));
     addSize(*app, command->size, "320x200", "Width and height in pixels")->default_str(sizeText(command->size));
     addBudget(*app, "--ram", command->ramBytes,
-              "Memory for subvolumes on their way to the device, and for stored ones kept to be read again")
+              "Main memory that detail may take on its way there, and to be kept for later")
         ->default_str("256M");
     app->add_option("--error-pixels", command->errorPixels, "Error that a picture may have, in pixels")
         ->type_name("PIXELS")

@@ -8,6 +8,7 @@
 #include "builder/paper/paper_file.h"
 #include "viewer/command/build_arguments.h"
 #include "viewer/command/commands.h"
+#include "viewer/command/help_text.h"
 #include "viewer/command/interrupt.h"
 #include "viewer/command/paper_arguments.h"
 #include "viewer/scene/option_values.h"
@@ -79,6 +80,7 @@ Json toJson(const BuildEstimate& estimate) {
             {"cell", estimate.frame.cell},
             {"levels", estimate.frame.levels},
             {"memory_bytes", estimate.memoryBytes},
+            {"memory_cap_bytes", estimate.memoryCap},
             {"temp_bytes", estimate.tempBytes},
             {"free_temp_bytes", estimate.freeTempBytes},
             {"file_bytes", estimate.fileBytes},
@@ -97,9 +99,10 @@ std::string summary(const BuildEstimate& estimate) {
                         m.boundsMin.z, m.boundsMax.x, m.boundsMax.y, m.boundsMax.z);
     text += fmt::format("  cell        {}{}, {} levels\n", estimate.isAreaComplete ? "" : "about ",
                         formatLength(estimate.frame.cell), estimate.frame.levels);
-    text += fmt::format("  memory      at most {}\n", formatBytes(estimate.memoryBytes));
-    text += estimate.tempBytes == 0 ? std::string("  temporary   nothing: it fits memory\n")
-                                    : fmt::format("  temporary   about {} of {} free\n",
+    text += fmt::format("  memory      about {}, at most {}\n", formatBytes(estimate.memoryBytes),
+                        formatBytes(estimate.memoryCap));
+    text += estimate.tempBytes == 0 ? std::string("  temporary   nothing: it fits memory, and is soon done\n")
+                                    : fmt::format("  temporary   up to {} of {} free\n",
                                                   formatBytes(estimate.tempBytes), formatBytes(estimate.freeTempBytes));
     text += fmt::format("  file        about {} of {} free\n", formatBytes(estimate.fileBytes),
                         formatBytes(estimate.freeOutputBytes));
@@ -167,26 +170,28 @@ Command addBuild(CLI::App& vcp) {
                     "stands for those in it, - for standard input")
         ->type_name("")
         ->required();
+    beginGroup(*app, help_group::kOutput);
     app->add_option("-o,--output", command->output, "The .vcp file to write")
         ->type_name("OUT.vcp")
         ->check([](const std::string& name) { return extensionProblem(name, ".vcp", false); });
     addOverwriteOption(*app, command->overwrite);
-    addBuildSettings(*app, command->settings);
-    app->add_option("--method", command->method,
-                    "certified, or paper: the octree of Demir and Westermann 2015, for comparison (in memory, no "
-                    "colour, nothing certified)")
-        ->type_name("certified|paper")
-        ->capture_default_str()
-        ->check(CLI::IsMember({"certified", "paper"}));
-    addPaperStructureOptions(*app, command->paper);
-    addPaperSchemeOption(*app, command->paper.mergeScheme);
     app->add_flag("--resume", command->resume, "Go on where an interrupted build of the same output was");
-    app->add_option("--checkpoint", command->checkpointSeconds, "What is done is made durable at most so often")
+    app->add_option("--checkpoint", command->checkpointSeconds,
+                    "Seconds between the times at which what is done is made safe from a crash, at least")
         ->type_name("SECONDS")
         ->capture_default_str()
         ->check(CLI::NonNegativeNumber);
     app->add_flag("--dry-run", command->dryRun,
                   "Say what is in the meshes and what the build would need; write nothing");
+    addBuildSettings(*app, command->settings, help_group::kBuilding);
+    beginGroup(*app, help_group::kPaper);
+    app->add_option("--method", command->method,
+                    "certified, or paper: their octree, for comparison (in memory, no colour, nothing certified)")
+        ->type_name("certified|paper")
+        ->capture_default_str()
+        ->check(CLI::IsMember({"certified", "paper"}));
+    addPaperStructureOptions(*app, command->paper);
+    addPaperSchemeOption(*app, command->paper.mergeScheme);
     addProgressOption(*app, command->report);
     addJsonOption(*app, command->report);
     return {app, [command, app] {

@@ -6,12 +6,12 @@
 
 #include "builder/measure/mesh_deviation.h"
 #include "viewer/command/commands.h"
+#include "viewer/command/help_text.h"
 #include "viewer/command/interrupt.h"
 #include "viewer/command/parsed_option.h"
 #include "viewer/command/render_arguments.h"
 #include "viewer/command/source_arguments.h"
 #include "viewer/export/deviation_picture.h"
-#include "viewer/export/section_export.h"
 #include "viewer/export/surface_mesh.h"
 #include "viewer/scene/inputs.h"
 #include "viewer/scene/option_values.h"
@@ -284,6 +284,7 @@ Command addCompare(CLI::App& vcp) {
         ->type_name("")
         ->required()
         ->expected(2);
+    beginGroup(*app, help_group::kOutput);
     app->add_option("-o,--output", command->outputs,
                     "A picture of A coloured by distance (.png), or A's vertices with their distances and colours "
                     "(.ply); both with two -o")
@@ -295,6 +296,7 @@ Command addCompare(CLI::App& vcp) {
         ->type_name("OUT.csv")
         ->check([](const std::string& name) { return extensionProblem(name, ".csv", false); });
     addOverwriteOption(*app, command->overwrite);
+    beginGroup(*app, help_group::kMeasured);
     app->add_flag("--both", command->both, "Measure B from A as well");
     app->add_option("--samples", command->samples, "Points of the surface, evenly by area, for the figures")
         ->type_name("N")
@@ -310,10 +312,12 @@ Command addCompare(CLI::App& vcp) {
               "Take of .vcp files the coarsest level within this distance [the finest]: surfaces are held in memory")
         ->type_name("LENGTH");
     addUnit(*app, command->unit, "What one unit of the files is");
+    beginGroup(*app, help_group::kCamera);
     addSize(*app, command->size, "1600x1000", "Width and height of the picture in pixels")
         ->default_str(sizeText(command->size));
     addCameraSettings(*app, command->render);
     addSourceSettings(*app, command->render.source);
+    beginGroup(*app, help_group::kReport);
     app->add_option("--threads", command->threads, "Threads that measure [one a processor]")
         ->type_name("N")
         ->check(CLI::Range(1, 1024));

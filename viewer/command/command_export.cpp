@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include "viewer/command/commands.h"
+#include "viewer/command/help_text.h"
 #include "viewer/command/interrupt.h"
 #include "viewer/command/parsed_option.h"
 #include "viewer/command/source_arguments.h"
@@ -203,6 +204,7 @@ Command addExport(CLI::App& vcp) {
     CLI::App* app =
         vcp.add_subcommand("export", "Write the surface of a .vcp file as a mesh, or a section as a drawing");
     app->add_option("FILE", command->file, "A .vcp file or its http(s) address")->type_name("")->required();
+    beginGroup(*app, help_group::kOutput);
     app->add_option("-o,--output", command->output,
                     "The file to write, its format by its name: .ply, .obj, .stl or .glb, or with --section .svg or "
                     ".dxf")
@@ -210,6 +212,7 @@ Command addExport(CLI::App& vcp) {
         ->required()
         ->check(checkName);
     addOverwriteOption(*app, command->overwrite);
+    beginGroup(*app, help_group::kPart);
     app->add_option("--level", command->level, "Level to export, 0 the coarsest [the finest, which is the mesh itself]")
         ->type_name("N");
     addParsed(*app, "--error", command->error, parseLength, "like 0.25 or 0.01%",
@@ -225,10 +228,11 @@ Command addExport(CLI::App& vcp) {
         ->type_name("X,Y,Z,X,Y,Z");
     addUnit(*app, command->unit, "What one unit of the file is: drawings get it, and their true size [unknown]");
     app->add_flag("--colour,!--no-colour", command->colour, "Write colours where the file has them [on]");
+    addSourceSettings(*app, command->source);
+    beginGroup(*app, help_group::kReport);
     app->add_option("--threads", command->threads, "Threads that read [one a processor]")
         ->type_name("N")
         ->check(CLI::Range(1, 1024));
-    addSourceSettings(*app, command->source);
     addProgressOption(*app, command->report);
     addJsonOption(*app, command->report);
     return {app, [command] { return run(*command); }};

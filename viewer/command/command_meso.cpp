@@ -280,7 +280,7 @@ RunCommand addMesoRender(CLI::App& meso) {
 }  // namespace
 
 Command addMeso(CLI::App& vcp) {
-    CLI::App* app = vcp.add_subcommand("meso", "Mesostructure assets");
+    CLI::App* app = vcp.add_subcommand("meso", "Make mesostructure: fine relief for the surfaces of scenes");
     app->require_subcommand(1);
     const RunCommand build = addMesoBuild(*app), render = addMesoRender(*app);
     const RunCommand base = addMesoBase(*app);

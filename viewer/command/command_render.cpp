@@ -6,19 +6,24 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <glm/geometric.hpp>
 
 #include "builder/measure/quantile.h"
 #include "mesostructure/base/subdivision.h"
 #include "mesostructure/method.h"
+#include "render/false_colours.h"
 #include "render/host_renderer.h"
 #include "render/pixel_samples.h"
+#include "viewer/annotation/picture_canvas.h"
 #include "viewer/camera/camera_path.h"
 #include "viewer/command/build_arguments.h"
 #include "viewer/command/commands.h"
+#include "viewer/command/help_text.h"
 #include "viewer/command/interrupt.h"
 #include "viewer/command/method_panels.h"
 #include "viewer/command/parsed_option.h"
 #include "viewer/command/render_arguments.h"
+#include "viewer/command/render_outputs.h"
 #include "viewer/picture/image_files.h"
 #include "viewer/picture/picture_sequence.h"
 #include "viewer/scene/option_values.h"
@@ -45,6 +50,7 @@ struct RenderCommand {
     uint32_t tile = 0;  // 0: not given
     uint32_t samples = kUsualSamples;
     bool transparent = false;
+    bool legend = false, scaleBar = false;
     int turntable = 0;
     std::string path;
     std::vector<std::string> methods;  // empty: those of the scene
@@ -75,6 +81,13 @@ struct Drawing {
     [[nodiscard]] double medianMs() const { return frameMs.empty() ? firstFrameMs : upperQuantile(frameMs, 0.5); }
     [[nodiscard]] double raysPerSecond() const { return double(stats.rays) / std::max(1e-3 * medianMs(), 1e-9); }
 };
+
+/// Whether the middle of the background is nearer to black than to white, as people see it.
+bool hasDarkBackground(const Shading& shading) {
+    constexpr float kMiddleGrey = 0.18f;
+    const glm::vec3 middle = 0.5f * (shading.backgroundTop + shading.backgroundBottom);
+    return glm::dot(middle, glm::vec3(0.2126f, 0.7152f, 0.0722f)) < kMiddleGrey;
+}
 
 /// Without --settle: updates until the coarsest page is there, and draws what there is.
 Result<SettledFrame> drawWhenDrawable(PictureRenderer& renderer, const FrameRequest& request) {
@@ -175,30 +188,55 @@ std::string summary(const RenderCommand& command, const Drawing& drawing, const 
     const std::string samples = drawing.samples > 1 ? fmt::format(", {} samples in {}", drawing.samples,
                                                                   formatSeconds(1e-3 * drawing.samplesMs))
                                                     : "";
-    return fmt::format("{}: {}, {} in {:.1f} ms ({:.1f} M rays/s){} on {}{}\n  {} subvolumes, {} resident, {}, {}",
+    return fmt::format("{}: {}, {} in {:.1f} ms ({:.1f} M rays/s){} on {}{}\n  {} parts, {} of memory, {}, {}",
                        command.output, sizeText(command.size), drawing.frameMs.empty() ? "first frame" : "a frame",
                        drawing.medianMs(), 1e-6 * drawing.raysPerSecond(), samples,
                        castBy(device, drawing.stats.onHost), device.software ? " (software)" : "", update.pagesInCut,
                        formatBytes(update.residentBytes), error, textOf(detailOf(update, askedPixels)));
 }
 
-Result<void> report(const RenderCommand& command, const Drawing& drawing, const std::vector<MethodPanel>& panels,
+/// Prints a line about the picture, or returns its figures, for --json.
+Result<Json> report(const RenderCommand& command, const Drawing& drawing, const std::vector<MethodPanel>& panels,
                     const DeviceInfo& device, const FrameRequest& request, const OrbitCamera& camera) {
     if (command.report.json) {
         Json json = toJson(drawing, device, request, camera);
         if (panels.front().iterationsMean) json["iterations_mean"] = *panels.front().iterationsMean;
         for (const MethodPanel& panel : panels)
             if (!command.methods.empty()) json["methods"].push_back(toJson(panel));
-        return printJson(json);
+        return json;
     }
     std::string text = summary(command, drawing, device, request.errorPixels);
     for (const MethodPanel& panel : panels)
         if (!command.methods.empty()) text += "\n  " + summary(panel);
-    return printLineAbout(command.output, text);
+    VCP_TRY(printLineAbout(command.output, text));
+    return Json();
+}
+
+using PaintOver = decltype(PictureSequenceOptions::paintOver);
+
+/// Returns what writes legend and scale bar over pictures from the cameras; empty where none is asked for. Errors:
+/// Usage, where there is nothing that a legend says.
+Result<PaintOver> paintOverOf(const RenderCommand& command, const LegendSubject& subject,
+                              const std::vector<OrbitCamera>& cameras) {
+    Annotations annotations{.legends = {}, .hasScaleBar = command.scaleBar, .lines = {}, .unit = command.render.unit};
+    const Shading& shading = command.render.shading;
+    if (command.legend) {
+        annotations.legends = legendsOf(shading.mode, subject);
+        if (annotations.legends.empty())
+            return Error{.code = ErrorCode::Usage,
+                         .message =
+                             "--legend goes with --shading steps, cells, fetches, level or error, on files that "
+                             "have such numbers"};
+    }
+    if (!command.legend && !command.scaleBar) return PaintOver();
+    std::vector<AnnotatedView> views;
+    for (const OrbitCamera& camera : cameras)
+        views.push_back(annotatedPicture(camera.current(), camera.viewHeight(), glm::uvec2(command.size)));
+    return annotationPainter(std::move(annotations), std::move(views), hasDarkBackground(shading));
 }
 
 /// Returns the cameras of a sequence, or the one camera.
-Result<std::vector<Camera>> camerasOf(const RenderCommand& command, const OrbitCamera& camera, const Box& bounds) {
+Result<std::vector<OrbitCamera>> camerasOf(const RenderCommand& command, const OrbitCamera& camera, const Box& bounds) {
     std::vector<OrbitCamera> cameras{camera};
     if (command.turntable > 0) {
         cameras = turntable(camera, bounds.centre(), command.turntable);
@@ -206,9 +244,7 @@ Result<std::vector<Camera>> camerasOf(const RenderCommand& command, const OrbitC
         VCP_TRY_ASSIGN(const auto keys, readCameras(command.path));
         cameras = cameraPath(keys, command.frames > 0 ? command.frames : kPathFrames);
     }
-    std::vector<Camera> current;
-    for (const OrbitCamera& each : cameras) current.push_back(each.current());
-    return current;
+    return cameras;
 }
 
 Json toJson(const TiledPictureStats& total, size_t pictures, uint32_t samples, const DeviceInfo& device,
@@ -231,17 +267,21 @@ Json toJson(const TiledPictureStats& total, size_t pictures, uint32_t samples, c
             {"bytes_read", total.update.bytesRead}};
 }
 
-/// Makes pictures in tiles and sequences, with progress; when it is cancelled, finished pictures stay.
-Result<void> makeTiled(PictureRenderer& renderer, const FrameRequest& request, const std::vector<Camera>& cameras,
-                       const RenderCommand& command, const OutputRules& rules) {
+/// Makes pictures in tiles and sequences, with progress; when it is cancelled, finished pictures stay. Returns their
+/// figures for --json, else it prints a line.
+Result<Json> makeTiled(PictureRenderer& renderer, const FrameRequest& request, const std::vector<OrbitCamera>& cameras,
+                       const PaintOver& paintOver, const RenderCommand& command, const OutputRules& rules) {
     ProgressDisplay display(command.report.progressStyle(), stderr);
+    std::vector<Camera> current;
+    for (const OrbitCamera& each : cameras) current.push_back(each.current());
     PictureSequence sequence(renderer, {.request = request,
-                                        .cameras = cameras,
+                                        .cameras = std::move(current),
                                         .files = {command.output, command.depth, command.normals},
                                         .isNumbered = command.isSequence(),
                                         .tile = command.tile > 0 ? command.tile : kTile,
                                         .samples = command.samples,
                                         .rules = rules,
+                                        .paintOver = paintOver,
                                         .cancel = interrupted});
     for (bool isDone = false; !isDone;) {
         VCP_TRY_ASSIGN(isDone, sequence.step());
@@ -252,13 +292,13 @@ Result<void> makeTiled(PictureRenderer& renderer, const FrameRequest& request, c
     display.finish();
     const TiledPictureStats& total = sequence.stats();
     if (command.report.json)
-        return printJson(
-            toJson(total, cameras.size(), samplesOf(request, command.samples), renderer.device(), request));
+        return toJson(total, cameras.size(), samplesOf(request, command.samples), renderer.device(), request);
     const std::string name = command.isSequence() ? fmt::format("{} to {}", numbered(command.output, 1).string(),
                                                                 numbered(command.output, cameras.size()).string())
                                                   : command.output;
-    return printLineAbout(command.output, fmt::format("{}: {}, {} tiles in {}", name, sizeText(command.size),
-                                                      total.tiles, formatSeconds(1e-3 * total.ms)));
+    VCP_TRY(printLineAbout(command.output, fmt::format("{}: {}, {} tiles in {}", name, sizeText(command.size),
+                                                       total.tiles, formatSeconds(1e-3 * total.ms))));
+    return Json();
 }
 
 /// Refuses options of the output that do not go together.
@@ -271,6 +311,8 @@ Result<void> checkOptions(const RenderCommand& command) {
     const std::filesystem::path output = command.output, depth = command.depth, normals = command.normals;
     if (depth == output || normals == output || (!command.depth.empty() && depth == normals))
         return usage("picture, --depth and --normals must be different files");
+    if (command.legend && !isFalseColour(command.render.shading.mode))
+        return usage("--legend goes with --shading steps, cells, fetches, level or error");
     if (command.methods.empty()) return {};
     if (command.tile > 0 || command.isSequence())
         return usage("--methods goes with one picture, without --tile, --turntable and --path");
@@ -305,9 +347,10 @@ Result<void> checkValidation(const PictureRenderer& renderer) {
     return problems.empty() ? Result<void>() : Error{.code = ErrorCode::Device, .message = problems.front()};
 }
 
-/// Draws one picture, or one a method, side by side.
-Result<void> drawOne(PictureRenderer& renderer, const FrameRequest& request, const OrbitCamera& camera,
-                     const RenderCommand& command, const SceneFile& scene, const OutputRules& rules) {
+/// Draws one picture, or one a method, side by side. Returns what report() does.
+Result<Json> drawOne(PictureRenderer& renderer, const FrameRequest& request, const OrbitCamera& camera,
+                     const PaintOver& paintOver, const RenderCommand& command, const SceneFile& scene,
+                     const OutputRules& rules) {
     std::vector<std::string> methods = command.methods;
     if (methods.empty()) methods.emplace_back();
     std::optional<Drawing> first;
@@ -324,6 +367,7 @@ Result<void> drawOne(PictureRenderer& renderer, const FrameRequest& request, con
             warnOnTerminal(fmt::format(
                 "{} rays of mesostructure were given up: too many pieces of a base, or of its map, along them",
                 drawing.stats.unresolvedRays));
+        if (paintOver) paintOver(0, panel.picture, 0);
         panels.push_back(std::move(panel));
         if (!first) first = std::move(drawing);
     }
@@ -365,10 +409,8 @@ Result<void> checkHost(const RenderCommand& command) {
     return checkHostDraws(request);
 }
 
-Result<int> run(const RenderCommand& command) {
-    VCP_TRY(checkOptions(command));
-    if (isHostName(command.render.device)) VCP_TRY(checkHost(command));
-    VCP_TRY(checkOutputs(command, rulesOf(command, {}), 1));
+/// Draws all inputs together, into one picture or a sequence. Returns its figures, for --json.
+Result<Json> render(const RenderCommand& command) {
     VCP_TRY_ASSIGN(const auto open,
                    openSceneShown(command.inputs, command.build, command.render.source, command.report.progressStyle(),
                                   {command.methods.empty() ? "" : command.methods[0], command.subdivide}));
@@ -384,6 +426,7 @@ Result<int> run(const RenderCommand& command) {
                                           ? *scene.camera
                                           : command.render.cameraFor(bounds, command.size));
     VCP_TRY_ASSIGN(const auto cameras, camerasOf(command, camera, bounds));
+    VCP_TRY_ASSIGN(const auto paintOver, paintOverOf(command, open.legendSubject(), cameras));
     const OutputRules rules = rulesOf(command, open.filesRead);
     VCP_TRY(checkOutputs(command, rules, cameras.size()));
     RendererOptions options = command.render.rendererOptions();
@@ -393,15 +436,69 @@ Result<int> run(const RenderCommand& command) {
 
     const FrameRequest request = requestFor(command, scene, camera, bounds);
     const InterruptScope catching;
-    if (!command.isTiled(request)) {
-        VCP_TRY(drawOne(*renderer, request, camera, command, scene, rules));
-        return 0;
-    }
+    if (!command.isTiled(request)) return drawOne(*renderer, request, camera, paintOver, command, scene, rules);
     if (!command.methods.empty())
         return Error{.code = ErrorCode::Usage,
                      .message = fmt::format("--methods goes with at most {} M pixels", kMostPixelsAtOnce >> 20)};
-    VCP_TRY(makeTiled(*renderer, request, cameras, command, rules));
+    VCP_TRY_ASSIGN(auto figures, makeTiled(*renderer, request, cameras, paintOver, command, rules));
     VCP_TRY(checkValidation(*renderer));
+    return figures;
+}
+
+/// Returns a command for each input, where the output names a picture of each. Errors: Usage.
+Result<std::vector<RenderCommand>> oneByOne(const RenderCommand& command) {
+    VCP_TRY_ASSIGN(const auto outputs, outputsFor(command.output, command.inputs));
+    std::vector<RenderCommand> commands(command.inputs.size(), command);
+    for (size_t i = 0; i < commands.size(); ++i) {
+        commands[i].inputs = {command.inputs[i]};
+        commands[i].output = outputs[i];
+        for (std::string* plane : {&commands[i].depth, &commands[i].normals}) {
+            if (plane->empty()) continue;
+            if (!isForEachInput(*plane) && commands.size() > 1)
+                return Error{
+                    .code = ErrorCode::Usage,
+                    .message = "--depth and --normals of several inputs need names like the pictures', with {}"};
+            *plane = outputFor(*plane, command.inputs[i]);
+        }
+    }
+    return commands;
+}
+
+/// Says which pictures are there already, and makes the folder of those to come. Errors: Io.
+Result<void> prepareOutputs(const std::vector<RenderCommand>& commands) {
+    std::vector<std::string> replaced;
+    std::error_code failed;
+    for (const RenderCommand& each : commands) {
+        const std::filesystem::path picture = each.output;
+        if (std::filesystem::exists(picture, failed)) replaced.push_back(each.output);
+        if (picture.has_parent_path() && !std::filesystem::create_directories(picture.parent_path(), failed) && failed)
+            return Error{.code = ErrorCode::Io,
+                         .message = "no such folder can be made: " + failed.message(),
+                         .file = picture.parent_path().string()};
+    }
+    if (!replaced.empty())
+        warnOnTerminal(fmt::format("{} of {} pictures are there already and are replaced: {}", replaced.size(),
+                                   commands.size(), fmt::join(replaced, ", ")));
+    return {};
+}
+
+Result<int> run(const RenderCommand& command) {
+    const bool isForEach = isForEachInput(command.output);
+    std::vector<RenderCommand> commands{command};
+    if (isForEach) {
+        VCP_TRY_ASSIGN(commands, oneByOne(command));
+    }
+    for (const RenderCommand& each : commands) VCP_TRY(checkOptions(each));
+    if (isHostName(command.render.device)) VCP_TRY(checkHost(command));
+    if (isForEach) VCP_TRY(prepareOutputs(commands));
+    for (const RenderCommand& each : commands) VCP_TRY(checkOutputs(each, rulesOf(command, {}), 1));
+    Json pictures = Json::array();
+    for (const RenderCommand& each : commands) {
+        VCP_TRY_ASSIGN(auto figures, render(each));
+        if (isForEach) figures["output"] = each.output;
+        pictures.push_back(std::move(figures));
+    }
+    if (command.report.json) VCP_TRY(printJson(isForEach ? Json{{"pictures", pictures}} : pictures.front()));
     return 0;
 }
 
@@ -420,30 +517,19 @@ Command addRender(CLI::App& vcp) {
                     "cache first")
         ->type_name("")
         ->required();
-    app->add_option("-o,--output", command->output, "The PNG file to write; - for standard output")
+    beginGroup(*app, help_group::kOutput);
+    app->add_option(
+           "-o,--output", command->output,
+           "The PNG file to write, with all inputs in it, or - for standard output; a folder, or a name with {} "
+           "like \"pictures/{}-front.png\": a picture of each input, with its name")
         ->type_name("OUT.png")
         ->required()
-        ->check([](const std::string& name) { return extensionProblem(name, ".png", true); });
+        ->check([](const std::string& name) {
+            const bool isFolder = isForEachInput(name) && name.find("{}") == std::string::npos;
+            return isFolder ? std::string() : extensionProblem(name, ".png", true);
+        });
     addOverwriteOption(*app, command->overwrite);
     addSize(*app, command->size, "1920x1200", "Width and height in pixels")->default_str(sizeText(command->size));
-    addRenderSettings(*app, command->render);
-    addSamples(*app, command->samples, "Rays a pixel, whose light is averaged: smooth edges; 1: none");
-    app->add_flag("--transparent", command->transparent,
-                  "No background: alpha is the part of a pixel where something is hit");
-    CLI::Option* turntable = app->add_option("--turntable", command->turntable,
-                                             "So many pictures once around the up axis: OUT-0001.png and so on")
-                                 ->type_name("N")
-                                 ->check(CLI::Range(1, 9999));
-    app->add_option("--path", command->path,
-                    "Pictures along a smooth path through the cameras of a JSON array, --frames of them [120]: "
-                    "OUT-0001.png and so on")
-        ->type_name("FILE")
-        ->excludes(turntable);
-    app->add_option(
-           "--tile", command->tile,
-           fmt::format("Draw in tiles of so many pixels a side [{} above {} M pixels]", kTile, kMostPixelsAtOnce >> 20))
-        ->type_name("PIXELS")
-        ->check(CLI::Range(16, 8192));
     app->add_option("--depth", command->depth,
                     "Write also the distance along each ray: .pfm (float, world units) or .png "
                     "(16-bit, 0 no hit, 1 nearest to 65535 farthest)")
@@ -452,10 +538,42 @@ Command addRender(CLI::App& vcp) {
     app->add_option("--normals", command->normals, "Write also the normals, world axes: .pfm or .png (128 + 127 n)")
         ->type_name("FILE")
         ->check(checkPlane);
-    app->add_option("--frames", command->frames,
-                    "Draw so many frames after the first and report their median time [0; 5 with --json]")
+    addRenderSettings(*app, command->render);
+    beginGroup(*app, help_group::kWritten);
+    app->add_flag("--legend", command->legend, "Write into the picture what its false colours mean");
+    app->add_flag("--scale-bar", command->scaleBar, "Write into the picture how long a length is in it");
+    beginGroup(*app, help_group::kLook);
+    addSamples(*app, command->samples, "Rays a pixel, whose light is averaged: smooth edges; 1: none");
+    app->add_flag("--transparent", command->transparent,
+                  "No background: alpha is the part of a pixel where something is hit");
+    app->add_option("--subdivide", command->subdivide,
+                    "Smooth all surfaces of the scene by Loop subdivision, so many times, in place of what it says")
+        ->type_name("N")
+        ->check(CLI::Range(0, meso::kMostSubdivisions));
+    beginGroup(*app, help_group::kPictures);
+    CLI::Option* turntable = app->add_option("--turntable", command->turntable,
+                                             "So many pictures once around the up axis: OUT-0001.png and so on")
+                                 ->type_name("N")
+                                 ->check(CLI::Range(1, 9999));
+    app->add_option("--path", command->path,
+                    "Pictures along a smooth path through the cameras of a JSON array: OUT-0001.png and so on")
+        ->type_name("FILE")
+        ->excludes(turntable);
+    app->add_option(
+           "--frames", command->frames,
+           "Pictures along --path [120]; of one picture: draw it so often again, and report the median time [0; 5 with "
+           "--json]")
         ->type_name("N")
         ->check(CLI::Range(1, 1'000'000));
+    beginGroup(*app, help_group::kLimits);
+    app->add_option(
+           "--tile", command->tile,
+           fmt::format("Draw in tiles of so many pixels a side [{} above {} M pixels]", kTile, kMostPixelsAtOnce >> 20))
+        ->type_name("PIXELS")
+        ->check(CLI::Range(16, 8192));
+    app->add_flag("--settle,!--no-settle", command->settle,
+                  "Wait until all detail that the picture wants is loaded [on]");
+    beginGroup(*app, help_group::kMeasuring);
     app->add_option("--methods", command->methods,
                     fmt::format("Mesostructure by these methods in place of the scene's, side by side: {}",
                                 fmt::join(meso::methodNames(), ", ")))
@@ -463,13 +581,8 @@ Command addRender(CLI::App& vcp) {
         ->delimiter(',')
         ->check(CLI::IsMember(std::vector<std::string>(meso::methodNames().begin(), meso::methodNames().end())))
         ->allow_extra_args(false);
-    app->add_option("--subdivide", command->subdivide,
-                    "Smooth all surfaces of the scene by Loop subdivision, so many times, in place of what it says")
-        ->type_name("N")
-        ->check(CLI::Range(0, meso::kMostSubdivisions));
     app->add_flag("--validation", command->validation, "With Vulkan's validation layers: what they say is an error");
-    app->add_flag("--settle,!--no-settle", command->settle, "Wait until all that the view wants is loaded [on]");
-    addBuildSettings(*app, command->build);
+    addBuildSettings(*app, command->build, help_group::kMeshes);
     addProgressOption(*app, command->report);
     addJsonOption(*app, command->report);
     return {app, [command] { return run(*command); }};

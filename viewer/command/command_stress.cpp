@@ -119,9 +119,9 @@ Command addStress(CLI::App& vcp) {
                     fmt::format("{}, or a file: a JSON array of cameras", fmt::join(stressPathNames(), ", ")))
         ->type_name("PATH")
         ->capture_default_str();
-    addBudget(*app, "--budget", command->budgetBytes, "Memory for subvolumes on the device")->default_str("256M");
+    addBudget(*app, "--budget", command->budgetBytes, "Memory of the device that detail may take")->default_str("256M");
     addBudget(*app, "--ram", command->ramBytes,
-              "Memory for subvolumes on their way there, and for stored ones kept to be read again")
+              "Main memory that detail may take on its way there, and to be kept for later")
         ->default_str("256M");
     app->add_option("--faults", command->faults,
                     "error=0.1,corrupt=0.01 (rates of reads), stall=500ms,stalls=0.02, latency=50ms,spread=20ms, "
@@ -131,7 +131,7 @@ Command addStress(CLI::App& vcp) {
             return parseFaults(text) ? std::string() : "must be like error=0.1,stall=500ms, not \"" + text + "\"";
         });
     addParsed(*app, "--order", command->orders, parseOrders, "like feedback,nearest",
-              "Which pages are read first: feedback (what rays ask for), error, nearest, breadth, random; of "
+              "Which pages are read first: feedback (what the picture misses), error, nearest, breadth, random; of "
               "several, the first is used and all\n"
               "are compared on the path's last view")
         ->type_name("A,B")

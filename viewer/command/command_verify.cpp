@@ -8,6 +8,7 @@
 #include "streaming/http_reader.h"
 #include "streaming/read_ahead.h"
 #include "viewer/command/commands.h"
+#include "viewer/command/help_text.h"
 #include "viewer/command/interrupt.h"
 #include "viewer/command/source_arguments.h"
 #include "viewer/scene/option_values.h"
@@ -164,7 +165,7 @@ Command addVerify(CLI::App& vcp) {
     auto command = std::make_shared<VerifyCommand>();
     CLI::App* app = vcp.add_subcommand("verify", "Check every byte of a .vcp file, and its surface against the mesh");
     app->add_option("FILE", command->file, "A .vcp file or its http(s) address")->type_name("")->required();
-    addSourceSettings(*app, command->source);
+    beginGroup(*app, help_group::kMeasured);
     app->add_option("--against", command->against, "The meshes it was built from: measures the distance, both ways")
         ->type_name("MESH");
     app->add_option("--samples", command->samples, "Samples, each way")
@@ -175,6 +176,7 @@ Command addVerify(CLI::App& vcp) {
     app->add_option("--threads", command->threads, "Threads that measure [one a processor]")
         ->type_name("N")
         ->check(CLI::Range(1, 1024));
+    addSourceSettings(*app, command->source);
     addProgressOption(*app, command->report);
     addJsonOption(*app, command->report);
     return {app, [command] { return run(*command); }};

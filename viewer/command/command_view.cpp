@@ -7,6 +7,7 @@
 #include "streaming/http_reader.h"
 #include "viewer/command/build_arguments.h"
 #include "viewer/command/commands.h"
+#include "viewer/command/help_text.h"
 #include "viewer/command/interrupt.h"
 #include "viewer/command/parsed_option.h"
 #include "viewer/command/render_arguments.h"
@@ -124,11 +125,13 @@ Command addView(CLI::App& vcp) {
                     ".vcp files or their http(s) addresses, a scene file (.json), or meshes, which are built into the "
                     "cache first")
         ->type_name("");
+    beginGroup(*app, help_group::kCamera);
     addSize(*app, command->size, "1280x800", "Width and height of the window [1280x800, then as it was left]");
     addRenderSettings(*app, command->render);
+    beginGroup(*app, help_group::kLook);
     addSamples(*app, command->samples,
                "Rays a pixel of a picture that stays, whose light is averaged: smooth edges; 1: none");
-    addBuildSettings(*app, command->build);
+    addBuildSettings(*app, command->build, help_group::kMeshes);
     addProgressOption(*app, command->report);
     addJsonOption(*app, command->report);
     app->footer(

@@ -6,6 +6,7 @@
 #include <filesystem>
 
 #include "octree/io/output_file.h"
+#include "viewer/command/help_text.h"
 #include "viewer/command/terminal_text.h"
 
 namespace vcp {
@@ -23,12 +24,13 @@ Result<void> print(const std::string& text) {
 }  // namespace
 
 void addJsonOption(CLI::App& app, ReportOptions& options) {
-    app.add_flag("--json", options.json, "Print one JSON object on stdout at the end");
+    app.add_flag("--json", options.json, "Print one JSON object on stdout at the end")->group(help_group::kReport);
 }
 
 void addProgressOption(CLI::App& app, ReportOptions& options) {
     app.add_option("--progress", options.progress, "Progress on stderr: bar, plain, json or none [a bar on a terminal]")
         ->type_name("STYLE:{bar,plain,json,none}")
+        ->group(help_group::kReport)
         ->check([](const std::string& name) {
             return progressStyleNamed(name) ? std::string() : "must be bar, plain, json or none, not \"" + name + "\"";
         });
@@ -36,7 +38,8 @@ void addProgressOption(CLI::App& app, ReportOptions& options) {
 
 void addOverwriteOption(CLI::App& app, bool& overwrite) {
     app.add_flag("--overwrite", overwrite,
-                 "Replace also an output that is of another kind or write-protected; never an input");
+                 "Replace also an output that is of another kind or write-protected; never an input")
+        ->group(help_group::kOutput);
 }
 
 std::string extensionProblem(const std::string& name, const std::string& extension, bool mayBePipe) {

@@ -7,6 +7,7 @@
 #include "octree/io/caught.h"
 #include "streaming/web_address.h"
 #include "viewer/command/commands.h"
+#include "viewer/command/help_text.h"
 #include "viewer/command/option_names.h"
 #include "viewer/command/suggestion.h"
 #include "viewer/command/terminal_text.h"
@@ -121,20 +122,23 @@ int runParsed(const CLI::App& vcp, const std::vector<Command>& commands) {
 }
 
 int runCommandLine(int argc, char** argv) {
-    CLI::App vcp("Views massive scans: builds meshes into octrees of vectors to the closest point, and ray-casts them.",
+    CLI::App vcp("Views massive scans: turns meshes of any size into one file that opens at once, and shows it.",
                  "vcp");
     vcp.require_subcommand(0, 1);
-    vcp.set_version_flag("--version", "vcp " VCP_VERSION);
-    vcp.get_formatter()->column_width(28);
-    vcp.footer("`vcp help CMD` says how a command is used.");
+    setUpHelp(vcp);
+    vcp.set_version_flag("--version", "vcp " VCP_VERSION, "Print the version")->group(help_group::kHelp);
+    vcp.footer("`vcp help CMD` says how a command is used, `vcp CMD --help-all` names all its options.");
     const std::vector<Command> commands = {addBuild(vcp),  addInfo(vcp),       addVerify(vcp),  addRender(vcp),
                                            addView(vcp),   addExport(vcp),     addCompare(vcp), addStress(vcp),
                                            addBench(vcp),  addMeso(vcp),       addDevices(vcp), addHelp(vcp),
                                            addManual(vcp), addCompletions(vcp)};
+    groupHelp(vcp);
     try {
         vcp.parse(argc, argv);
     } catch (const CLI::CallForHelp&) {
         return printLine(vcp.help()) ? 0 : kFailed;
+    } catch (const CLI::CallForAllHelp&) {
+        return printLine(vcp.help("", CLI::AppFormatMode::All)) ? 0 : kFailed;
     } catch (const CLI::CallForVersion& version) {
         return printLine(version.what()) ? 0 : kFailed;
     } catch (const CLI::ParseError& wrong) {

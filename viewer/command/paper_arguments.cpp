@@ -6,6 +6,8 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "viewer/command/help_text.h"
+
 namespace vcp {
 
 namespace {
@@ -39,15 +41,16 @@ void addChoice(CLI::App& app, const char* name, Value& value, const std::string&
 }  // namespace
 
 void addPaperStructureOptions(CLI::App& app, PaperOptions& options) {
-    addLength(app, "--paper-band", options.band, "paper: vectors are kept in blocks nearer than this (t)");
+    const ScopedGroup paper(app, help_group::kPaper);
+    addLength(app, "--paper-band", options.band, "Vectors are kept in blocks nearer than this (t)");
     addLength(app, "--paper-merge", options.mergeThreshold,
-              "paper: cells are merged where their vectors err by less; negative: never");
+              "Cells are merged where their vectors err by less; negative: never");
     app.add_option_function<std::string>(
            "--paper-k",
            [&options](const std::string& text) {
                options.growRounds = text == "exact" ? CornerOctreeOptions::kExactPoints : std::stoi(text);
            },
-           fmt::format("paper: rounds of region growing that find the vectors (k); exact: the closest points of the "
+           fmt::format("Rounds of region growing that find the vectors (k); exact: the closest points of the "
                        "whole mesh [{}]",
                        options.growRounds))
         ->type_name("ROUNDS|exact")
@@ -56,27 +59,29 @@ void addPaperStructureOptions(CLI::App& app, PaperOptions& options) {
                 !text.empty() && text.size() <= 2 && text.find_first_not_of("0123456789") == std::string::npos;
             return text == "exact" || isCount ? std::string() : "must be 0 to 99 or exact, not \"" + text + "\"";
         });
-    addChoice<PaperPacking>(app, "--paper-packing", options.packing, "paper: directions of the vectors",
+    addChoice<PaperPacking>(app, "--paper-packing", options.packing, "Directions of the vectors",
                             {{"spherical", PaperPacking::Spherical}, {"octahedral", PaperPacking::Octahedral}});
     addChoice<bool>(app, "--paper-empty", options.safeEmpty,
-                    "paper: distances of empty nodes, rounded up as published, or so that they are safe to step",
+                    "Distances of empty nodes, rounded up as published, or so that they are safe to step",
                     {{"published", false}, {"safe", true}});
 }
 
 void addPaperSchemeOption(CLI::App& app, PaperScheme& scheme) {
+    const ScopedGroup paper(app, help_group::kPaper);
     addChoice<PaperScheme>(
-        app, "--paper-scheme", scheme, "paper: interpolation of the vectors",
+        app, "--paper-scheme", scheme, "Interpolation of the vectors",
         {{"longer", PaperScheme::Longer}, {"min-plane", PaperScheme::MinPlane}, {"trilinear", PaperScheme::Trilinear}});
 }
 
 void addPaperMarchOptions(CLI::App& app, PaperMarch& march) {
-    addLength(app, "--paper-epsilon", march.epsilon, "paper: a ray hits nearer than this");
+    const ScopedGroup paper(app, help_group::kPaper);
+    addLength(app, "--paper-epsilon", march.epsilon, "A ray hits nearer than this");
     addPaperSchemeOption(app, march.scheme);
-    addChoice<PaperStep>(app, "--paper-step", march.step, "paper: steps near the surface",
+    addChoice<PaperStep>(app, "--paper-step", march.step, "Steps near the surface",
                          {{"planar", PaperStep::Planar}, {"distance", PaperStep::Distance}});
-    addChoice<bool>(app, "--paper-back", march.back, "paper: a hit is moved back to where the distance is epsilon",
+    addChoice<bool>(app, "--paper-back", march.back, "A hit is moved back to where the distance is epsilon",
                     {{"on", true}, {"off", false}});
-    addChoice<bool>(app, "--paper-cache", march.cached, "paper: a step reuses the node and vectors of the step before",
+    addChoice<bool>(app, "--paper-cache", march.cached, "A step reuses the node and vectors of the step before",
                     {{"on", true}, {"off", false}});
 }
 

@@ -10,7 +10,7 @@
 #include <CLI/CLI.hpp>
 #include <glm/vec2.hpp>
 
-#include "viewer/export/section_export.h"
+#include "viewer/annotation/length_unit.h"
 
 namespace vcp {
 

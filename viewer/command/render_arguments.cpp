@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "viewer/command/help_text.h"
 #include "viewer/command/paper_arguments.h"
 #include "viewer/command/parsed_option.h"
 #include "viewer/command/source_arguments.h"
@@ -50,6 +51,7 @@ void addSamples(CLI::App& app, uint32_t& samples, const std::string& description
 }
 
 void addCameraSettings(CLI::App& app, RenderSettings& settings) {
+    const ScopedGroup camera(app, help_group::kCamera);
     addParsed(
         app, "--camera", settings.camera, parseCamera,
         "a view, a camera file, or an azimuth and an elevation below 90 degrees, like 30,35, and a magnification, "
@@ -63,16 +65,17 @@ void addCameraSettings(CLI::App& app, RenderSettings& settings) {
 
 void addRenderSettings(CLI::App& app, RenderSettings& settings) {
     addCameraSettings(app, settings);
+    const ScopedGroup scope(app, help_group::kLook);
     addLight(app, settings.shading);
-    addParsed(app, "--shading", settings.shading.mode, shadingNamed,
-              fmt::format("one of {}", fmt::join(kShadingNames, ", ")),
-              "lit or unlit (with colour where there is any), clay, normals; false colours: steps, cells, fetches "
-              "(work of each ray), level, error (certified, up to a pixel)")
+    addParsed(
+        app, "--shading", settings.shading.mode, shadingNamed, fmt::format("one of {}", fmt::join(kShadingNames, ", ")),
+        "lit or unlit (with colour where there is any), clay, normals; false colours: level (of detail), error (up "
+        "to a pixel), steps, cells, fetches (work of each ray)")
         ->type_name(fmt::format("MODE:{{{}}}", fmt::join(kShadingNames, ",")))
         ->default_str("lit");
-    app.add_flag("--shadows", settings.shading.shadows, "Hard shadows: a further ray a pixel");
+    app.add_flag("--shadows", settings.shading.shadows, "Light casts hard shadows");
     app.add_option("--occlusion", settings.shading.occlusionRays,
-                   "Ambient occlusion, by so many further rays a pixel [0]")
+                   "Corners and folds are darker (ambient occlusion), by so many rays a pixel; 8 without N [off]")
         ->type_name("N")
         ->expected(0, 1)
         ->default_str(std::to_string(kUsualOcclusionRays))
@@ -83,22 +86,27 @@ void addRenderSettings(CLI::App& app, RenderSettings& settings) {
         ->type_name("PLANE")
         ->expected(1, int(kMostSections));
     app.add_flag("--caps", settings.caps, "Fill what sections cut open (for closed surfaces)");
+    beginGroup(app, help_group::kLimits);
     app.add_option("--error-pixels", settings.errorPixels,
-                   "Error that a picture may have, in pixels: finer levels are loaded until then")
+                   "Error that may be seen, in pixels: detail is loaded until the picture errs by no more")
         ->type_name("PIXELS")
         ->capture_default_str()
         ->check(CLI::Range(0.01, 1000.0));
-    addBudget(app, "--budget", settings.budgetBytes, "Memory for subvolumes on the device, never exceeded")
+    addBudget(app, "--budget", settings.budgetBytes, "Memory of the device that detail may take, never exceeded")
         ->default_str("512M");
     addBudget(app, "--ram", settings.ramBytes,
-              "Memory for subvolumes on their way there, and for stored ones kept to be read again; never exceeded")
+              "Main memory that detail may take on its way there, and to be kept for later; never exceeded")
         ->default_str("256M");
-    addPaperMarchOptions(app, settings.march);
-    addSourceSettings(app, settings.source);
-    app.add_option("--device", settings.device,
-                   "Vulkan device: an index or a part of a name, see `vcp devices` [the best one]; host: pictures "
-                   "without Vulkan")
+    app.add_option(
+           "--device", settings.device,
+           "Device that draws: an index or a part of a name, see `vcp devices` [the best one]; host: the processor, "
+           "without Vulkan")
         ->type_name("DEVICE");
+    addSourceSettings(app, settings.source);
+    addPaperMarchOptions(app, settings.march);
+    beginGroup(app, help_group::kWritten);
+    addUnit(app, settings.unit,
+            "What one unit of the files is, for lengths that are shown: um, mm, cm, m, km, in or ft");
 }
 
 }  // namespace vcp

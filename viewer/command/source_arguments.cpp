@@ -1,5 +1,6 @@
 #include "viewer/command/source_arguments.h"
 
+#include "viewer/command/help_text.h"
 #include "viewer/command/interrupt.h"
 #include "viewer/command/parsed_option.h"
 #include "viewer/scene/option_values.h"
@@ -8,6 +9,7 @@ namespace vcp {
 
 void addSourceSettings(CLI::App& app, SourceAccess& settings) {
     settings.cancelled = interrupted;
+    const ScopedGroup servers(app, help_group::kServers);
     app.add_option("--ca-file", settings.caFile, "Certificates of authorities to trust for https, PEM [the system's]")
         ->type_name("FILE")
         ->check(CLI::ExistingFile);
@@ -15,7 +17,7 @@ void addSourceSettings(CLI::App& app, SourceAccess& settings) {
                    "Keep what a server sends in this folder, and read it from there next time")
         ->type_name("DIR");
     addParsed(app, "--cache-limit", settings.cacheBytes, parseBytes, "like 512M or 4G",
-              "Bytes that the folder may hold; what was used longest ago goes")
+              "Bytes that the folder of --cache may hold; what was used longest ago goes")
         ->type_name("BYTES")
         ->default_str("4G");
 }

@@ -9,8 +9,8 @@
 
 #include "builder/measure/mesh_samples.h"
 #include "builder/stream/colour_encoding.h"
+#include "viewer/annotation/stroke_text.h"
 #include "viewer/export/diverging_colours.h"
-#include "viewer/export/stroke_text.h"
 
 namespace vcp {
 

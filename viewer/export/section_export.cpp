@@ -1,7 +1,6 @@
 #include "viewer/export/section_export.h"
 
 #include <algorithm>
-#include <array>
 #include <limits>
 
 #include <fmt/format.h>
@@ -11,9 +10,6 @@
 namespace vcp {
 
 namespace {
-
-constexpr std::array<LengthUnit, 7> kUnits = {
-    {{"um", 1e-3, 13}, {"mm", 1, 4}, {"cm", 10, 5}, {"m", 1e3, 6}, {"km", 1e6, 7}, {"in", 25.4, 1}, {"ft", 304.8, 2}}};
 
 /// A line in the drawing's plane.
 struct FlatLine {
@@ -137,11 +133,6 @@ std::string dxfOf(const Drawing& drawing, const std::vector<std::string>& commen
 }
 
 }  // namespace
-
-std::optional<LengthUnit> unitNamed(std::string_view name) {
-    const auto found = std::ranges::find(kUnits, name, &LengthUnit::name);
-    return found == kUnits.end() ? std::nullopt : std::optional(*found);
-}
 
 Result<SectionFigures> exportSection(const ByteReader& reader, const SurfaceCut& cut,
                                      const SectionExportOptions& options) {

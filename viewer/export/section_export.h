@@ -9,24 +9,14 @@
 #include <filesystem>
 #include <optional>
 #include <string>
-#include <string_view>
 
 #include "octree/io/output_file.h"
+#include "viewer/annotation/length_unit.h"
 #include "viewer/export/mesh_format.h"
 #include "viewer/export/section_lines.h"
 #include "viewer/export/surface_stream.h"
 
 namespace vcp {
-
-/// What one unit of the world is.
-struct LengthUnit {
-    std::string_view name;
-    double millimetres = 0;
-    int dxf = 0;  ///< $INSUNITS
-};
-
-/// Returns the unit "um", "mm", "cm", "m", "km", "in" or "ft", or none.
-std::optional<LengthUnit> unitNamed(std::string_view name);
 
 struct SectionExportOptions {
     std::filesystem::path output;

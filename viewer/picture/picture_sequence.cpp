@@ -36,12 +36,15 @@ Result<void> PictureSequence::begin() {
                                       .normals = !o_.files.normals.empty(),
                                       .problem = o_.problem,
                                       .cancel = o_.cancel};
-    picture_ = std::make_unique<TiledPicture>(*renderer_, request, options,
-                                              [this](const PictureBand& band) { return take(band); });
+    picture_ =
+        std::make_unique<TiledPicture>(*renderer_, request, options, [this](PictureBand& band) { return take(band); });
+    rows_ = 0;
     return {};
 }
 
-Result<void> PictureSequence::take(const PictureBand& band) {
+Result<void> PictureSequence::take(PictureBand& band) {
+    if (o_.paintOver) o_.paintOver(finished_, band.picture, rows_);
+    rows_ += band.picture.height;
     depth_.insert(depth_.end(), band.depth.begin(), band.depth.end());
     normals_.insert(normals_.end(), band.normals.begin(), band.normals.end());
     return png_->add(band.picture.rgba);

@@ -29,6 +29,9 @@ struct PictureSequenceOptions {
     uint32_t tile = 2048;     ///< edge in pixels, at least 16
     uint32_t samples = 1;     ///< of a pixel
     OutputRules rules = {};   ///< what the files may replace
+    /// Called with rows of each picture before they are written, to paint over them: the picture's number in `cameras`,
+    /// its rows, over its whole width, and the number of the first. May be empty.
+    std::function<void(size_t picture, Picture& rows, uint32_t firstRow)> paintOver = {};
     /// Called as those of TiledPictureOptions are.
     std::function<void(const Error& problem)> problem = {};
     std::function<bool()> cancel = {};
@@ -65,7 +68,7 @@ private:
         return o_.isNumbered ? numbered(path, finished_ + 1) : path;
     }
     Result<void> begin();
-    Result<void> take(const PictureBand& band);
+    Result<void> take(PictureBand& band);
     Result<void> finish();
 
     PictureRenderer* renderer_;
@@ -75,6 +78,7 @@ private:
     // The parts of the picture in the making.
     std::unique_ptr<TiledPicture> picture_;
     std::unique_ptr<PngRows> png_;
+    uint32_t rows_ = 0;  // that are written
     std::vector<float> depth_;
     std::vector<glm::vec3> normals_;
 };

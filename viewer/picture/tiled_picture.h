@@ -45,9 +45,9 @@ struct TiledPictureStats {
 /// A picture in the making, tile by tile. What it is given must stay until it is done.
 class TiledPicture {
 public:
-    using Take = std::function<Result<void>(const PictureBand&)>;
+    using Take = std::function<Result<void>(PictureBand&)>;
 
-    /// `request`: its width and height may be up to 2^20 here. `take` gets each band.
+    /// `request`: its width and height may be up to 2^20 here. `take` gets each band, and may change it.
     TiledPicture(PictureRenderer& renderer, const FrameRequest& request, const TiledPictureOptions& options, Take take)
         : renderer_(&renderer), whole_(request), options_(options), take_(std::move(take)) {}
 

@@ -12,6 +12,7 @@
 #include "octree/io/result.h"
 #include "octree/page/paper_page.h"
 #include "render/view/renderer.h"
+#include "viewer/annotation/length_unit.h"
 #include "viewer/camera/orbit_camera.h"
 #include "viewer/scene/option_values.h"
 #include "viewer/scene/scene_opening.h"
@@ -36,6 +37,7 @@ struct RenderSettings {
     std::vector<PlaneChoice> sections;
     bool caps = false;
     PaperMarch march;
+    std::optional<LengthUnit> unit;  ///< the world's, for lengths that are shown
     SourceAccess source;
 
     /// Checks that the settings go with the dataset's method. Errors: Usage.

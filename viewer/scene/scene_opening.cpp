@@ -49,6 +49,15 @@ Box OpenedScene::bounds() const {
     return all;
 }
 
+LegendSubject OpenedScene::legendSubject() const {
+    LegendSubject subject{.levels = {}, .hasRelief = !file.surfaces.empty()};
+    for (const Part& part : parts) {
+        const auto& header = part.open.dataset->header;
+        subject.levels.push_back(header.method == Method::Paper ? 0 : header.levels);
+    }
+    return subject;
+}
+
 std::vector<PlacedDataset> OpenedScene::placed() const {
     std::vector<PlacedDataset> datasets;
     for (const Part& part : parts)

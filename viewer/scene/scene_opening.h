@@ -16,6 +16,7 @@
 #include "builder/mesh_sample.h"
 #include "render/view/renderer.h"
 #include "streaming/page_source.h"
+#include "viewer/annotation/legend.h"
 #include "viewer/scene/inputs.h"
 #include "viewer/scene/scene_file.h"
 
@@ -65,6 +66,7 @@ struct OpenedScene {
     /// Returns the box about all datasets where they are placed, and the surfaces.
     [[nodiscard]] Box bounds() const;
     [[nodiscard]] std::vector<PlacedDataset> placed() const;
+    [[nodiscard]] LegendSubject legendSubject() const;
 };
 
 /// Opens the datasets of a scene, each by `open`, which is given its file, and makes its surfaces. `name` stands for

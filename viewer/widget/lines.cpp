@@ -5,7 +5,7 @@
 
 #include <fmt/format.h>
 
-#include "viewer/picture/overlay_lines.h"
+#include "viewer/annotation/overlay_lines.h"
 #include "viewer/widget/handles.h"
 
 namespace vcp::widget {

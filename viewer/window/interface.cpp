@@ -33,8 +33,7 @@ void Interface::layOut(glm::ivec2 framebuffer, const Look& look) {
     session_->viewer().setCovered({.right = panelWidth_, .top = toolbarHeight_, .bottom = statusHeight_});
     if (isOpen) {
         if (session_->showsPages) drawPages();
-        drawScaleBar();
-        drawMeasured();
+        drawAnnotations();
         drawSectionHandles();
         if (session_->showsFeedback()) drawFeedback();
         if (session_->user().panel) layOutPanel();
@@ -365,7 +364,7 @@ void Interface::copyCamera() {
 void Interface::pasteCamera() { session_->pasteCamera(host_.pasteText()); }
 
 void Interface::copyMeasurement() {
-    host_.copyText(measurementText(session_->measurement()));
+    host_.copyText(measurementText(session_->measurement(), session_->unit()));
     session_->note("Measurement copied");
 }
 

@@ -18,8 +18,6 @@
 #include "viewer/window/file_list.h"
 #include "viewer/window/view_session.h"
 
-struct ImDrawList;
-
 namespace vcp {
 
 /// What the panels need of the window.
@@ -107,17 +105,17 @@ private:
     /// Ends either, and what was set for it.
     void endCard();
 
-    void drawScaleBar() const;
-    void drawMeasured() const;
+    void drawAnnotations() const;
     void drawSectionHandles() const;
     void drawPages() const;
     void drawFeedback() const;
-    /// Draws text on a plate: the picture behind may be as light or dark as the text.
-    void plateAt(ImDrawList& list, glm::vec2 at, const std::string& line) const;
+    /// Draws text on a plate.
+    void plateAt(glm::vec2 at, const std::string& line) const;
 
     void openDemo();
     void actionButton(const char* label, ViewerAction action, const Tip& tip, float width = 0);
     [[nodiscard]] PictureChoice pictureChosen() const;
+    [[nodiscard]] bool annotatesPictures() const;
     [[nodiscard]] float units(float n) const { return look_->units(n); }
 
     ViewSession* session_;
@@ -131,6 +129,7 @@ private:
     bool showsDetails_ = false;  // opened by the status bar
     int pictureSize_ = 0;        // index in kPictureSizes
     PictureChoice picture_;
+    std::optional<bool> annotatesPictures_;  // none: where something is measured
     int sequencePictures_ = 120;
 };
 

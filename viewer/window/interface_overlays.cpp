@@ -1,4 +1,4 @@
-// What is drawn over the picture: scale bar, measured lines, handles of sections, boxes of parts, what rays asked for.
+// What is drawn over the picture: annotations, handles of sections, boxes of parts, what rays asked for.
 #include <algorithm>
 #include <cmath>
 
@@ -7,95 +7,85 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
-#include "viewer/scene/option_values.h"
+#include "render/false_colours.h"
+#include "viewer/annotation/annotations.h"
+#include "viewer/annotation/projector.h"
 #include "viewer/window/interface.h"
 
 namespace vcp {
 
 namespace {
 
-constexpr float kScaleBarLargest = 160;
 constexpr size_t kMostBoxes = 2000;
 constexpr double kUrgentDoublings = 5;  // doublings of the tolerated error, until a ray that asks is red
 constexpr float kInset = 16;            // of what stands in a corner of the picture
 
-/// Maps 0 to 1 from blue through green to red, as the false colours (shaders/shade.comp).
-ImU32 heatColour(float x, int alpha) {
-    const glm::vec3 c =
-        255.0f * glm::clamp(glm::vec3(3 * x - 1.2f, 1.5f - std::abs(3 * x - 1.2f), 1.4f - 3 * x), 0.0f, 1.0f);
+ImU32 packed(glm::vec3 colour, int alpha) {
+    const glm::vec3 c = 255.0f * colour + 0.5f;
     return IM_COL32(int(c.x), int(c.y), int(c.z), alpha);
 }
 
-/// Draws the part of a line of the world that is before the eye.
-void drawSegment(ImDrawList& list, const Viewer& viewer, glm::dvec3 from, glm::dvec3 to, ImU32 colour, float width) {
-    const OrbitCamera& camera = viewer.camera();
-    const double near = 1e-3 * camera.focusDistance;
-    double a = camera.depthOf(from), b = camera.depthOf(to);
-    if (a < near && b < near) return;
-    if (a < near) from += (to - from) * ((near - a) / (b - a));
-    if (b < near) to = from + (to - from) * ((a - near) / (a - b));
-    const auto p = camera.pixelOf(from, viewer.size()), q = camera.pixelOf(to, viewer.size());
-    if (p && q) list.AddLine(vec(glm::vec2(*p)), vec(glm::vec2(*q)), colour, width);
-}
+/// Draws annotations behind the panels, with the window's fonts.
+class WindowCanvas : public AnnotationCanvas {
+public:
+    explicit WindowCanvas(const Look& look) : look_(look), list_(*ImGui::GetBackgroundDrawList()) {}
 
-/// Returns the largest of 1, 2, 5 times a power of ten that is at most `most`.
-double roundLength(double most) {
-    const double power = std::pow(10.0, std::floor(std::log10(most)));
-    for (const double step : {5.0, 2.0})
-        if (step * power <= most) return step * power;
-    return power;
-}
+    void line(glm::dvec2 from, glm::dvec2 to, double width, AnnotationInk ink) override {
+        list_.AddLine(vec(glm::vec2(from)), vec(glm::vec2(to)), colourOf(ink), float(width));
+    }
+    void disc(glm::dvec2 middle, double radius, AnnotationInk ink) override {
+        list_.AddCircleFilled(vec(glm::vec2(middle)), float(radius), colourOf(ink));
+    }
+    void rectangle(glm::ivec2 low, glm::ivec2 high, glm::vec3 colour) override {
+        list_.AddRectFilled(vec(glm::vec2(low)), vec(glm::vec2(high)), packed(colour, 255));
+    }
+    void plate(glm::dvec2 low, glm::dvec2 high) override {
+        list_.AddRectFilled(vec(glm::vec2(low)), vec(glm::vec2(high)), plateColour(), look_.units(4));
+    }
+    void text(glm::dvec2 at, const std::string& text) override {
+        const std::string set = typeset(text);
+        list_.AddText(vec(glm::vec2(at)), look_.palette.ink, set.data(), set.data() + set.size());
+    }
+    [[nodiscard]] glm::dvec2 textSize(const std::string& text) const override {
+        const std::string set = typeset(text);
+        const ImVec2 size = ImGui::CalcTextSize(set.data(), set.data() + set.size());
+        return {size.x, size.y};
+    }
+
+private:
+    [[nodiscard]] ImU32 plateColour() const {
+        return (look_.palette.raised & ~IM_COL32_A_MASK) | IM_COL32(0, 0, 0, 235);
+    }
+    [[nodiscard]] ImU32 colourOf(AnnotationInk ink) const {
+        const Palette& palette = look_.palette;
+        return ink == AnnotationInk::Text   ? palette.ink
+               : ink == AnnotationInk::Halo ? palette.halo
+               : ink == AnnotationInk::Mark ? palette.accent
+                                            : palette.raised;
+    }
+
+    const Look& look_;
+    ImDrawList& list_;
+};
 
 }  // namespace
 
-void Interface::plateAt(ImDrawList& list, glm::vec2 at, const std::string& line) const {
-    const std::string set = typeset(line);
-    const ImVec2 size = ImGui::CalcTextSize(set.data(), set.data() + set.size());
-    const ImU32 plate = (look_->palette.raised & ~IM_COL32_A_MASK) | IM_COL32(0, 0, 0, 235);
-    list.AddRectFilled({at.x - units(6), at.y - units(3)}, {at.x + size.x + units(6), at.y + size.y + units(3)}, plate,
-                       units(4));
-    list.AddText(vec(at), look_->palette.ink, set.data(), set.data() + set.size());
+void Interface::plateAt(glm::vec2 at, const std::string& line) const {
+    WindowCanvas canvas(*look_);
+    writeOnPlate(canvas, at, line, double(look_->scale));
 }
 
-void Interface::drawScaleBar() const {
+void Interface::drawAnnotations() const {
     const Viewer& viewer = session_->viewer();
-    const double unitsPerPixel = viewer.camera().viewHeight() / std::max(1, viewer.size().y);
-    const float largest = std::min(units(kScaleBarLargest), 0.5f * (size_.x - panelWidth_));
-    const double length = roundLength(double(largest) * unitsPerPixel);
-    const auto pixels = float(length / unitsPerPixel);
-    if (!std::isfinite(pixels)) return;
-    ImDrawList& list = *ImGui::GetBackgroundDrawList();
-    const glm::vec2 from(units(kInset), size_.y - statusHeight_ - units(kInset));
-    const Palette& palette = look_->palette;
-    for (const auto& [colour, width] : {std::pair(palette.halo, units(4)), std::pair(palette.ink, units(2))}) {
-        list.AddLine(vec(from), {from.x + pixels, from.y}, colour, width);
-        for (const float x : {from.x, from.x + pixels})
-            list.AddLine({x, from.y - units(4)}, {x, from.y + units(4)}, colour, width);
-    }
-    const bool everywhere = viewer.camera().projection == Projection::Orthographic;
-    plateAt(list, from + glm::vec2(units(6), -units(28)), formatLength(length) + (everywhere ? "" : " in the middle"));
-}
-
-void Interface::drawMeasured() const {
-    ImDrawList& list = *ImGui::GetBackgroundDrawList();
-    const Viewer& viewer = session_->viewer();
-    const Palette& palette = look_->palette;
-    const auto pixelOf = [&](const MeasuredPoint& p) { return viewer.camera().pixelOf(p.position, viewer.size()); };
-    for (const MeasuredLine& line : session_->measurement().lines())
-        for (size_t i = 0; i < line.size(); ++i) {
-            const auto at = pixelOf(line[i]);
-            if (!at) continue;
-            const glm::vec2 here(*at);
-            const auto next = i + 1 < line.size() ? pixelOf(line[i + 1]) : std::nullopt;
-            const glm::vec2 there(next ? glm::vec2(*next) : here);
-            list.AddLine(vec(here), vec(there), palette.halo, units(5));
-            list.AddLine(vec(here), vec(there), palette.accent, units(2.5f));
-            list.AddCircleFilled(vec(here), units(6), palette.raised);
-            list.AddCircleFilled(vec(here), units(4), palette.accent);
-            if (next)
-                plateAt(list, 0.5f * (here + there) + glm::vec2(units(12), -units(8)),
-                        formatLength(segmentLength(line, i)));
-        }
+    WindowCanvas canvas(*look_);
+    draw(session_->annotations(),
+         {.camera = viewer.camera().current(),
+          .viewHeight = viewer.camera().viewHeight(),
+          .size = glm::uvec2(glm::max(viewer.size(), 1)),
+          .low = {0, toolbarHeight_},
+          .high = {size_.x - panelWidth_, size_.y - statusHeight_},
+          .unit = double(look_->scale)},
+         canvas);
 }
 
 void Interface::drawSectionHandles() const {
@@ -128,23 +118,25 @@ void Interface::drawPages() const {
     ImDrawList& list = *ImGui::GetBackgroundDrawList();
     Viewer& viewer = session_->viewer();
     const std::vector<PageBox> pages = viewer.renderer().residentPages();
-    const float finest = float(std::max(1u, viewer.status().levels - 1));
+    const double finest = std::max(1u, viewer.status().levels - 1);
+    const Projector projector(viewer.camera().current(), glm::uvec2(glm::max(viewer.size(), 1)));
     size_t drawn = 0;
     for (const PageBox& page : pages) {
         if (!page.isDrawn || ++drawn > kMostBoxes) continue;
-        const ImU32 colour = heatColour(float(page.level) / finest, 150);
+        const ImU32 colour = packed(falseColour(page.level / finest), 150);
         for (int axis = 0; axis < 3; ++axis)
             for (int side = 0; side < 4; ++side) {
                 const glm::dvec3 from = page.corner + page.edges[size_t(axis + 1) % 3] * double(side & 1) +
                                         page.edges[size_t(axis + 2) % 3] * double(side >> 1);
-                drawSegment(list, viewer, from, from + page.edges[size_t(axis)], colour, units(1));
+                if (const auto edge = projector.segment(from, from + page.edges[size_t(axis)]))
+                    list.AddLine(vec(glm::vec2(edge->from)), vec(glm::vec2(edge->to)), colour, units(1));
             }
     }
     const std::string said =
-        fmt::format("{} of {} subvolumes in memory are drawn{}",
+        fmt::format("{} of {} parts in memory are drawn{}",
                     std::count_if(pages.begin(), pages.end(), [](const PageBox& p) { return p.isDrawn; }), pages.size(),
                     drawn > kMostBoxes ? fmt::format("; the first {} as boxes", kMostBoxes) : "");
-    plateAt(list, {units(kInset + 6), size_.y - statusHeight_ - units(kInset + 56)}, said);
+    plateAt({units(kInset + 6), size_.y - statusHeight_ - units(kInset + 56)}, said);
 }
 
 void Interface::drawFeedback() const {
@@ -169,9 +161,10 @@ void Interface::drawFeedback() const {
         const ImU32 colour = asks ? IM_COL32(255, int(210 * (1 - urgency)), 40, 255) : IM_COL32(70, 150, 90, 255);
         list.AddRectFilled(vec(at), vec(at + cell - units(1)), colour);
     }
-    const std::string said =
-        kept ? fmt::format("{} of {} rays asked", asking, kept->errorPixels.size()) : "Nothing is missing";
-    plateAt(list, corner + glm::vec2(0, size.y + units(8)), said);
+    const std::string said = kept
+                                 ? fmt::format("Detail is missing at {} of {} points", asking, kept->errorPixels.size())
+                                 : "Nothing is missing";
+    plateAt(corner + glm::vec2(0, size.y + units(8)), said);
 }
 
 }  // namespace vcp

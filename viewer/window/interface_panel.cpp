@@ -224,7 +224,8 @@ void Interface::layOutMeasuring() {
 void Interface::layOutMeasuredLine(size_t number) {
     const MeasuredLine& line = session_->measurement().lines()[number];
     if (session_->measurement().lines().size() > 1) caption(*look_, fmt::format("Line {}", number + 1).c_str());
-    for (const MeasuredText& each : measuredTexts(line)) valueRow(*look_, typeset(each.what).c_str(), each.value);
+    for (const MeasuredText& each : measuredTexts(line, session_->unit()))
+        valueRow(*look_, typeset(each.what).c_str(), each.value);
 }
 
 void Interface::layOutLayers() {
@@ -233,10 +234,9 @@ void Interface::layOutLayers() {
                  layer.triangles > 0 ? formatCount(layer.triangles) : std::string("relief"));
     ImGui::Dummy({0, 0});
     switchRow(*look_, "Boxes of the parts drawn", session_->showsPages,
-              {"The subvolumes that the picture is made of: blue is coarse, red is fine", "B"});
+              {"The parts that the picture is made of: blue is coarse, red is fine", "B"});
     bool feedback = session_->showsFeedback();
-    if (switchRow(*look_, "Where detail is asked for", feedback,
-                  {"Which rays of the picture asked for finer parts", "I"}))
+    if (switchRow(*look_, "Where detail is asked for", feedback, {"Where the picture still misses detail", "I"}))
         session_->showFeedback(feedback);
 }
 
@@ -244,6 +244,10 @@ void Interface::layOutSave() {
     comboRow(*look_, "##size", kPictureSizeNames, pictureSize_, {"The size of what is saved", ""});
     switchRow(*look_, "No background", picture_.transparent, {"What is not hit is transparent", ""});
     switchRow(*look_, "Depth as well", picture_.depth, {"Distances along the rays, as .pfm", ""});
+    bool annotates = annotatesPictures();
+    if (switchRow(*look_, "Scale, measures, legend", annotates,
+                  {"Written over what is saved, as over the window; by itself where something is measured", ""}))
+        annotatesPictures_ = annotates;
     ImGui::BeginDisabled(session_->saving().has_value());
     if (textButton(*look_, icon::kPicture, "Save the picture", {"picture-1.png in the working folder", "Ctrl+S"}, -1))
         savePicture();
@@ -310,9 +314,12 @@ void Interface::layOutDetails() {
 
 PictureChoice Interface::pictureChosen() const {
     PictureChoice choice = picture_;
+    choice.annotated = annotatesPictures();
     choice.size = pictureSize_ == 0 ? session_->viewer().size() : kPictureSizes[pictureSize_];
     return choice;
 }
+
+bool Interface::annotatesPictures() const { return annotatesPictures_.value_or(!session_->measurement().empty()); }
 
 void Interface::savePicture() { session_->savePicture(pictureChosen()); }
 

@@ -27,22 +27,26 @@ bool hasAngle(const MeasuredLine& line, size_t i) {
            line[i].position != line[i + 1].position;
 }
 
-std::string textOf(const MeasuredLine& line, size_t number) {
+/// Returns a length with its error, to the digits that the error leaves.
+std::string lengthWithError(double length, double error, const std::optional<LengthUnit>& unit) {
+    const WrittenUnit written = writtenUnit(length, unit);
+    return fmt::format("{} +-{:.2g}{}{}", rounded(length * written.factor, error * written.factor),
+                       error * written.factor, written.name.empty() ? "" : " ", written.name);
+}
+
+std::string textOf(const MeasuredLine& line, size_t number, const std::optional<LengthUnit>& unit) {
     std::string text;
     for (size_t i = 0; i < line.size(); ++i) {
         const MeasuredPoint& p = line[i];
         text += fmt::format("{}.{}  {}  {}  {}  +-{:.2g} (level {})", number, i + 1, rounded(p.position.x, p.error),
                             rounded(p.position.y, p.error), rounded(p.position.z, p.error), p.error, p.level);
         if (i > 0)
-            text +=
-                fmt::format("\n     distance {} +-{:.2g}",
-                            rounded(segmentLength(line, i - 1), segmentError(line, i - 1)), segmentError(line, i - 1));
+            text += "\n     distance " + lengthWithError(segmentLength(line, i - 1), segmentError(line, i - 1), unit);
         if (hasAngle(line, i)) text += fmt::format("\n     angle {:.2f} degrees", angleAt(line, i));
         text += '\n';
     }
     if (line.size() > 2)
-        text += fmt::format("{}  length {} +-{:.2g}\n", number, rounded(lineLength(line), lineError(line)),
-                            lineError(line));
+        text += fmt::format("{}  length {}\n", number, lengthWithError(lineLength(line), lineError(line), unit));
     return text;
 }
 
@@ -102,11 +106,8 @@ void Measurement::takeBack() {
     if (lines_.back().empty()) lines_.pop_back();
 }
 
-std::vector<MeasuredText> measuredTexts(const MeasuredLine& line) {
+std::vector<MeasuredText> measuredTexts(const MeasuredLine& line, const std::optional<LengthUnit>& unit) {
     std::vector<MeasuredText> texts;
-    const auto length = [](double value, double error) {
-        return fmt::format("{} +-{:.2g}", rounded(value, error), error);
-    };
     for (size_t i = 0; i < line.size(); ++i) {
         const MeasuredPoint& p = line[i];
         texts.push_back({fmt::format("Point {} +-{:.2g}", i + 1, p.error),
@@ -114,17 +115,17 @@ std::vector<MeasuredText> measuredTexts(const MeasuredLine& line) {
                                      rounded(p.position.z, p.error))});
         if (i > 0)
             texts.push_back({fmt::format("Distance {} to {}", i, i + 1),
-                             length(segmentLength(line, i - 1), segmentError(line, i - 1))});
+                             lengthWithError(segmentLength(line, i - 1), segmentError(line, i - 1), unit)});
         if (hasAngle(line, i))
             texts.push_back({fmt::format("Angle at {}", i + 1), fmt::format("{:.2f}°", angleAt(line, i))});
     }
-    if (line.size() > 2) texts.push_back({"Length", length(lineLength(line), lineError(line))});
+    if (line.size() > 2) texts.push_back({"Length", lengthWithError(lineLength(line), lineError(line), unit)});
     return texts;
 }
 
-std::string measurementText(const Measurement& measurement) {
+std::string measurementText(const Measurement& measurement, const std::optional<LengthUnit>& unit) {
     std::string text;
-    for (size_t i = 0; i < measurement.lines().size(); ++i) text += textOf(measurement.lines()[i], i + 1);
+    for (size_t i = 0; i < measurement.lines().size(); ++i) text += textOf(measurement.lines()[i], i + 1, unit);
     return text;
 }
 
@@ -151,8 +152,9 @@ std::string measurementCsv(const Measurement& measurement) {
     return csv;
 }
 
-std::string measurementJson(const Measurement& measurement) {
+std::string measurementJson(const Measurement& measurement, const std::optional<LengthUnit>& unit) {
     Json json;
+    if (unit) json["unit"] = unit->name;
     json["lines"] = Json::array();
     for (const MeasuredLine& line : measurement.lines()) json["lines"].push_back(toJson(line));
     return json.dump(2) + '\n';

@@ -6,10 +6,13 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include <glm/vec3.hpp>
+
+#include "viewer/annotation/length_unit.h"
 
 namespace vcp {
 
@@ -54,17 +57,18 @@ struct MeasuredText {
     std::string what;   ///< "Point 1 +-0.00058", "Distance 1 to 2", "Angle at 2", "Length"
     std::string value;  ///< coordinates, a length with its error, an angle
 };
-std::vector<MeasuredText> measuredTexts(const MeasuredLine& line);
+/// `unit`, here and below: the world's, which lengths are written in (writtenUnit); coordinates stay as they are.
+std::vector<MeasuredText> measuredTexts(const MeasuredLine& line, const std::optional<LengthUnit>& unit = {});
 
 /// Returns the text for a person: coordinates to the digits that the error leaves.
-std::string measurementText(const Measurement& measurement);
+std::string measurementText(const Measurement& measurement, const std::optional<LengthUnit>& unit = {});
 
 /// Returns a row for each point: line, point, x, y, z, error, level, segment, segment_error, total, angle_degrees;
 /// empty where there is none. Lines and points count from 1; segment and total end at the point.
 std::string measurementCsv(const Measurement& measurement);
 
 /// Returns {"lines":[{"points":[{"position":[x,y,z],"error":e,"level":n}],"segments":[..],"length":l,"length_error":e,
-/// "angles_degrees":[..]}]}, indented.
-std::string measurementJson(const Measurement& measurement);
+/// "angles_degrees":[..]}]}, indented; with "unit" where it is known. All numbers are in the world's unit.
+std::string measurementJson(const Measurement& measurement, const std::optional<LengthUnit>& unit = {});
 
 }  // namespace vcp

@@ -10,6 +10,7 @@
 #include <glm/common.hpp>
 
 #include "octree/io/output_file.h"
+#include "viewer/annotation/picture_canvas.h"
 #include "viewer/camera/camera_path.h"
 #include "viewer/window/theme.h"
 #include "viewer/window/thumbnails.h"
@@ -152,6 +153,7 @@ Result<void> ViewSession::show(const OpenedScene& open, const std::vector<std::s
     for (const OpenedScene::Part& part : open.parts) finest_->add(part.open.reader, *part.open.dataset, part.placement);
     VCP_TRY(viewer_->open(open.placed(), open.surfaces, camera, nameOf(inputs)));
     if (!open.surfaces.warnings.empty()) note(open.surfaces.warnings.front());
+    subject_ = open.legendSubject();
     layers_.clear();
     for (size_t i = 0; i < open.parts.size(); ++i) {
         // What a mesh was built into is called as the mesh.
@@ -288,13 +290,29 @@ void ViewSession::takePicked() {
     measurement_.add({(*picked)->position, (*picked)->certifiedError, (*picked)->level});
 }
 
+Annotations ViewSession::annotations() const {
+    LegendSubject shown{{}, subject_.hasRelief};
+    for (size_t i = 0; i < subject_.levels.size(); ++i)
+        if (!std::ranges::count(viewer_->hidden(), uint32_t(i))) shown.levels.push_back(subject_.levels[i]);
+    Annotations all{
+        .legends = legendsOf(viewer_->shading().mode, shown), .hasScaleBar = true, .lines = {}, .unit = unit()};
+    for (const MeasuredLine& line : measurement_.lines()) {
+        AnnotatedLine& annotated = all.lines.emplace_back();
+        for (const MeasuredPoint& point : line) annotated.points.push_back(point.position);
+        for (size_t i = 0; i + 1 < line.size(); ++i)
+            annotated.lengths.push_back(lengthText(segmentLength(line, i), unit()));
+    }
+    return all;
+}
+
 void ViewSession::exportMeasurement() {
     if (measurement_.empty()) return note("nothing is measured yet: D, then click");
     const auto nameOf = [](int number) { return fmt::format("measurement-{}", number); };
     const std::string name =
         nameOf(freeNumber([&](int i) { return isThere(nameOf(i) + ".csv") || isThere(nameOf(i) + ".json"); }));
     const auto table = writeFile(name + ".csv", OutputKind::Text, std::string_view(measurementCsv(measurement_)));
-    const auto json = writeFile(name + ".json", OutputKind::JsonText, std::string_view(measurementJson(measurement_)));
+    const auto json =
+        writeFile(name + ".json", OutputKind::JsonText, std::string_view(measurementJson(measurement_, unit())));
     if (!table || !json) return say((table ? json : table).error().line());
     note(fmt::format("written: {}.csv and .json in {}", name, workingFolder()));
 }
@@ -354,7 +372,12 @@ void ViewSession::beginSaving(const PictureChoice& choice, std::filesystem::path
                                    .tile = kSavedTile,
                                    .samples = std::min(options_.samples, kUsualSamples),
                                    .problem = [this](const Error& problem) { say(problem.line()); }};
-    for (const OrbitCamera& camera : cameras) options.cameras.push_back(camera.current());
+    std::vector<AnnotatedView> views;
+    for (const OrbitCamera& camera : cameras) {
+        options.cameras.push_back(camera.current());
+        views.push_back(annotatedPicture(camera.current(), camera.viewHeight(), glm::uvec2(choice.size)));
+    }
+    if (choice.annotated) options.paintOver = annotationPainter(annotations(), std::move(views), isDark(user_.theme));
     auto pictures = std::make_unique<PictureSequence>(**view, std::move(options));
     saving_ = Saving{std::move(name), *std::move(view), std::move(pictures), isSequence};
 }

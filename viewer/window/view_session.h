@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "viewer/annotation/annotations.h"
 #include "viewer/finest_pick.h"
 #include "viewer/picture/picture_sequence.h"
 #include "viewer/scene/render_settings.h"
@@ -46,6 +47,7 @@ struct PictureChoice {
     glm::ivec2 size{1920, 1080};  ///< up to 16384 each
     bool transparent = false;     ///< no background
     bool depth = false;           ///< also the distance along each ray, as .pfm
+    bool annotated = false;       ///< with annotations()
 };
 
 class ViewSession {
@@ -116,6 +118,10 @@ public:
     [[nodiscard]] bool isPicking() const { return pick_.valid(); }
     /// Picks on the finest level and adds the point; it may have to be read first, and then comes later.
     void measureAt(glm::dvec2 pixel);
+    /// Returns the unit of what is shown, for lengths.
+    [[nodiscard]] const std::optional<LengthUnit>& unit() const { return options_.render.unit; }
+    /// Returns what is written over the picture: what its colours mean, the scale bar, what is measured.
+    [[nodiscard]] Annotations annotations() const;
     /// Writes measurement-1.csv and .json into the working folder, or the next free number, and reports it.
     void exportMeasurement();
 
@@ -179,6 +185,7 @@ private:
     std::string problem_, note_;
     double notedAt_;  // time of the update that saw the note first; not a number until then
     std::vector<Layer> layers_;
+    LegendSubject subject_;  // all that is open, in the order of Viewer::hidden()
     Measurement measurement_;
     std::shared_ptr<ScenePick> finest_;
     std::future<Picked> pick_;

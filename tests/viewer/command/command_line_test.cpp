@@ -584,6 +584,124 @@ TEST_F(CommandLine, TheHostSaysWhatItDoesNotDraw) {
     EXPECT_FALSE(fs::exists(out));
 }
 
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+TEST_F(CommandLine, ADryRunIsNearWhatTheBuildThenTakes) {
+    const fs::path scan = *folder_ / "estimated.ply", made = *folder_ / "estimated.vcp";
+    const std::string makeScan = (fs::path(VCP_EXECUTABLE).parent_path() / "make_scan").string();
+    ASSERT_EQ(std::system((makeScan + " --triangles 300k -o " + scan.string() + " >/dev/null").c_str()), 0);
+    // With checkpoints whenever one may be made, and with none.
+    for (const char* seconds : {"0", "100000"}) {
+        const auto build = [&](std::vector<std::string> more) {
+            std::vector<std::string> arguments{"build",     scan.string(), "-o",           made.string(), "--json",
+                                               "--threads", "2",           "--checkpoint", seconds};
+            arguments.insert(arguments.end(), more.begin(), more.end());
+            const Ran ran = run(arguments);
+            EXPECT_EQ(ran.status, 0) << ran.err;
+            return Json::parse(ran.out);
+        };
+        const Json told = build({"--dry-run"}), took = build({});
+        const auto near = [&](const char* expected, const char* real, double less, double more) {
+            const double wanted = told[expected], is = took[real];
+            EXPECT_LE(less * is, wanted) << expected;
+            EXPECT_LE(wanted, more * is) << expected;
+        };
+        near("memory_bytes", "peak_rss_bytes", 0.9, 1.5);
+        near("temp_bytes", "temp_bytes", 0.6, 1.6);
+        near("file_bytes", "file_bytes", 1, 3);
+        EXPECT_GE(told["memory_cap_bytes"], told["memory_bytes"]);
+    }
+}
+#endif
+
+TEST_F(CommandLine, LegendsAndScaleBarsAreWrittenIntoPictures) {
+    const auto render = [&](const char* name, std::vector<std::string> more) {
+        std::vector<std::string> arguments{"render", dataset().string(), "-o",       (*folder_ / name).string(),
+                                           "--size", "320x240",          "--device", "host"};
+        arguments.insert(arguments.end(), more.begin(), more.end());
+        return run(arguments);
+    };
+    const auto picture = [&](const char* name) { return readPng(*folder_ / name).value(); };
+    ASSERT_EQ(render("without.png", {"--shading", "level"}).status, 0);
+    ASSERT_EQ(render("whole.png", {"--shading", "level", "--legend", "--scale-bar", "--unit", "mm"}).status, 0);
+    ASSERT_EQ(
+        render("tiles.png", {"--shading", "level", "--legend", "--scale-bar", "--unit", "mm", "--tile", "50"}).status,
+        0);
+    ASSERT_EQ(
+        render("around.png", {"--shading", "level", "--legend", "--scale-bar", "--unit", "mm", "--turntable", "2"})
+            .status,
+        0);
+    ASSERT_EQ(render("inches.png", {"--shading", "level", "--scale-bar", "--unit", "in"}).status, 0);
+    EXPECT_NE(picture("whole.png"), picture("without.png"));
+    EXPECT_EQ(picture("tiles.png"), picture("whole.png"));
+    EXPECT_EQ(picture("around-0001.png"), picture("whole.png"));
+    EXPECT_NE(picture("inches.png"), picture("whole.png"));
+    expectFailure(render("x.png", {"--legend", "--shading", "clay"}), 2, "--legend goes with --shading steps");
+    expectFailure(render("x.png", {"--unit", "ell"}), 2, "um, mm, cm");
+}
+
+TEST_F(CommandLine, APictureOfEachInput) {
+    const fs::path work = *folder_ / "each";
+    fs::create_directories(work);
+    fs::copy_file(dataset(), work / "one.vcp", fs::copy_options::overwrite_existing);
+    fs::copy_file(dataset(), work / "two.vcp", fs::copy_options::overwrite_existing);
+    const auto render = [&](const std::string& output, std::vector<std::string> more, const char* second = "two.vcp") {
+        std::vector<std::string> arguments{"render",
+                                           (work / "one.vcp").string(),
+                                           (work / second).string(),
+                                           "-o",
+                                           output,
+                                           "--size",
+                                           "40x30",
+                                           "--samples",
+                                           "1",
+                                           "--device",
+                                           "host"};
+        arguments.insert(arguments.end(), more.begin(), more.end());
+        return run(arguments);
+    };
+    const std::string pictures = (work / "new/pictures/").string();
+    const Ran first = render(pictures, {"--json"});
+    ASSERT_EQ(first.status, 0) << first.err;
+    EXPECT_EQ(first.err.find("replaced"), std::string::npos) << first.err;
+    const Json told = Json::parse(first.out);
+    ASSERT_EQ(told["pictures"].size(), 2u);
+    EXPECT_EQ(told["pictures"][1]["output"], pictures + "two.png");
+    EXPECT_EQ(readPng(pictures + "one.png").value(), readPng(pictures + "two.png").value());
+    const Ran again = render(pictures, {});
+    EXPECT_EQ(again.status, 0) << again.err;
+    EXPECT_NE(again.err.find("2 of 2 pictures are there already and are replaced"), std::string::npos) << again.err;
+
+    ASSERT_EQ(render((work / "{}-deep.png").string(), {"--depth", (work / "{}.pfm").string()}).status, 0);
+    EXPECT_TRUE(fs::exists(work / "two-deep.png") && fs::exists(work / "two.pfm"));
+    expectFailure(render((work / "{}.png").string(), {"--depth", (work / "depth.pfm").string()}), 2, "with {}");
+    expectFailure(render(pictures, {}, "../each/one.vcp"), 2, "would both be drawn into");
+    expectFailure(render((work / "{}.jpg").string(), {}), 2, ".png");
+
+    // A picture's name that stands for an input: the input stays.
+    const std::string before = contentOf(work / "one.vcp");
+    fs::create_symlink("one.vcp", work / "link.png");
+    fs::rename(work / "two.vcp", work / "link.vcp");
+    EXPECT_EQ(render((work / "{}.png").string(), {"--overwrite"}, "link.vcp").status, 1);
+    EXPECT_EQ(contentOf(work / "one.vcp"), before);
+}
+
+// What only benchmarks and the paper's method need is not in the way of what everybody needs, and is there on demand.
+TEST_F(CommandLine, HelpIsShortAndAllOfItIsThere) {
+    for (const char* command : {"build", "render"}) {
+        const std::string brief = run({command, "--help"}).out, all = run({command, "--help-all"}).out;
+        EXPECT_EQ(brief.find("--paper-"), std::string::npos) << brief;
+        EXPECT_NE(brief.find("More with --help-all"), std::string::npos) << brief;
+        EXPECT_NE(all.find("--paper-scheme"), std::string::npos) << all;
+        EXPECT_EQ(all.find("More with --help-all"), std::string::npos);
+        for (const std::string& text : {brief, all})
+            for (size_t from = 0, end; from < text.size(); from = end + 1) {
+                end = std::min(text.find('\n', from), text.size());
+                EXPECT_LE(end - from, 110u) << text.substr(from, end - from);
+            }
+    }
+    EXPECT_NE(run({"view", "--help"}).out.find("How it looks:"), std::string::npos);
+}
+
 TEST_F(CommandLine, PicturesInTilesAndSequences) {
     if (!hasDevice()) GTEST_SKIP() << "no Vulkan device";
     const auto render = [&](const std::string& name, std::vector<std::string> more) {

@@ -20,8 +20,12 @@ helpOf() {
     "$vcp" help "${words[@]:1}"
 }
 
-# optionsOf PATH: the names of its options, as they stand at the beginnings of help's lines.
-optionsOf() { helpOf "$1" | sed -n 's/^  \(-[^ ]*\).*/\1/p' | sed 's/{[^}]*}//g' | tr ',' '\n' | sort -u; }
+# optionsOf PATH: the names of its options, those that few need too, as they stand at the beginnings of help's lines.
+optionsOf() {
+    local -a words
+    read -ra words <<<"$1"
+    "$vcp" "${words[@]:1}" --help-all | sed -n 's/^  \(-[^ ]*\).*/\1/p' | sed 's/{[^}]*}//g' | tr ',' '\n' | sort -u
+}
 
 # commandsOf PATH: it, and the commands that its help lists, and theirs.
 commandsOf() {

@@ -2,9 +2,9 @@
 #include "builder/measure/mesh_deviation.h"
 #include "tests/support/mesh_reading.h"
 #include "tests/viewer/export/exported_mesh.h"
+#include "viewer/annotation/stroke_text.h"
 #include "viewer/export/deviation_picture.h"
 #include "viewer/export/diverging_colours.h"
-#include "viewer/export/stroke_text.h"
 #include "viewer/export/surface_mesh.h"
 
 namespace vcp::test {

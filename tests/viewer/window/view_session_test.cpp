@@ -442,6 +442,48 @@ TEST_F(ViewSessionTest, DepthAndTransparencyAreChosen) {
               (std::set<std::string>{"depth-0001.pfm", "depth-0002.pfm", "picture-0001.png", "picture-0002.png"}));
 }
 
+// In two tiles across and several rows of them, and in each picture of a turntable where the camera has it.
+TEST_F(ViewSessionTest, WhatIsMeasuredIsWrittenOverWhatIsSaved) {
+    constexpr PictureChoice kPlain{.size = {600, 1100}}, kAnnotated{.size = {600, 1100}, .annotated = true};
+    session_->setTheme(ThemeChoice::Dark);
+    Shading shading = session_->viewer().shading();
+    shading.mode = ShadingMode::Level;
+    session_->viewer().setShading(shading);
+    const glm::dvec3 from(-0.5, 0.2, 0), to(0.4, -0.3, 0.6);
+    session_->measurement().add({from, 0.001, 0});
+    session_->measurement().add({to, 0.001, 0});
+    EXPECT_EQ(session_->annotations().legends.size(), 1u);
+    EXPECT_EQ(session_->annotations().lines.at(0).lengths, std::vector<std::string>{"1.192"});
+
+    const auto colourAt = [&](const Picture& shown, glm::dvec2 pixel) {
+        const size_t at = 4 * (size_t(pixel.y) * shown.width + size_t(pixel.x));
+        return glm::ivec3(shown.rgba[at], shown.rgba[at + 1], shown.rgba[at + 2]);
+    };
+    const glm::ivec3 mark(77, 163, 255);
+    const OrbitCamera& camera = session_->viewer().camera();
+    session_->savePicture(kPlain);
+    ASSERT_TRUE(isSaved());
+    session_->savePicture(kAnnotated);
+    ASSERT_TRUE(isSaved());
+    const Picture plain = picture("picture-1.png"), annotated = picture("picture-2.png");
+    for (const glm::dvec3& point : {from, to, 0.7 * from + 0.3 * to}) {
+        const glm::dvec2 pixel = camera.pixelOf(point, kPlain.size).value();
+        EXPECT_EQ(colourAt(annotated, pixel), mark);
+        EXPECT_NE(colourAt(plain, pixel), mark);
+    }
+    // The scale bar at the lower left, the legend at the lower right; above, all is as it was.
+    EXPECT_NE(colourAt(annotated, {20, 1074}), colourAt(plain, {20, 1074}));
+    EXPECT_NE(colourAt(annotated, {560, 1050}), colourAt(plain, {560, 1050}));
+    EXPECT_TRUE(std::equal(plain.rgba.begin(), plain.rgba.begin() + 4 * 600 * 200, annotated.rgba.begin()));
+
+    session_->saveTurntable(kAnnotated, 4);
+    ASSERT_TRUE(isSaved());
+    EXPECT_EQ(picture("turntable-1/picture-0001.png"), annotated);
+    OrbitCamera turned = camera;
+    turned.orbit(session_->viewer().bounds().centre(), 1.5707963267948966, 0);
+    EXPECT_EQ(colourAt(picture("turntable-1/picture-0002.png"), turned.pixelOf(from, kPlain.size).value()), mark);
+}
+
 TEST_F(ViewSessionTest, WhatIsCancelledLeavesWhatIsFinished) {
     session_->saveTurntable(kTwoTiles, 5);
     ASSERT_TRUE(turnUntil([&] { return !session_->saving() || fs::exists("turntable-1/picture-0003.png.partial"); }));

@@ -51,7 +51,7 @@ CommandEntry entryOf(const CLI::App& app, const std::string& parent) {
     entry.footer = app.get_footer();
     for (const CLI::Option* option : app.get_options())
         if (option->get_positional() && !option->get_group().empty()) entry.arguments.push_back(argumentOf(*option));
-    for (const std::string& group : app.get_groups()) {
+    for (const std::string& group : groupsOf(app)) {
         if (group.empty()) continue;
         OptionGroup made{group, {}};
         for (const CLI::Option* option : app.get_options())
@@ -64,6 +64,13 @@ CommandEntry entryOf(const CLI::App& app, const std::string& parent) {
 }
 
 }  // namespace
+
+std::vector<std::string> groupsOf(const CLI::App& app) {
+    std::vector<std::string> groups = app.get_groups();
+    if (const CLI::Option* help = app.get_help_ptr())
+        std::ranges::stable_partition(groups, [&](const std::string& group) { return group != help->get_group(); });
+    return groups;
+}
 
 CommandEntry commandTree(const CLI::App& app) { return entryOf(app, ""); }
 

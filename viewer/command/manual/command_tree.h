@@ -38,6 +38,9 @@ struct CommandEntry {
     std::vector<CommandEntry> commands;
 };
 
+/// Returns the groups of a command's options as they are read: in the order of their first options, that of help last.
+std::vector<std::string> groupsOf(const CLI::App& app);
+
 /// Reads the tree of a command line; hidden options and commands are left out.
 CommandEntry commandTree(const CLI::App& app);
 

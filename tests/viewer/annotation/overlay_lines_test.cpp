@@ -1,5 +1,5 @@
 // Lines over pictures: which pixels they touch, and how much.
-#include "viewer/picture/overlay_lines.h"
+#include "viewer/annotation/overlay_lines.h"
 
 #include <limits>
 

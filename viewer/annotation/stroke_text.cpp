@@ -1,11 +1,10 @@
-#include "viewer/export/stroke_text.h"
+#include "viewer/annotation/stroke_text.h"
 
 #include <algorithm>
-#include <array>
-#include <cmath>
 
 #include <glm/common.hpp>
-#include <glm/geometric.hpp>
+
+#include "viewer/annotation/pixels.h"
 
 namespace vcp {
 
@@ -31,6 +30,7 @@ constexpr Letter kLetters[] = {
     {'+', "0343 2125"},
     {'-', "0343"},
     {'.', "2020"},
+    {',', "201a"},
     {'%', "0046 0616150506 3141403031"},
     {'(', "36242230"},
     {')', "16242210"},
@@ -70,12 +70,6 @@ glm::dvec2 pointOf(const char* stroke) {
     return {double(stroke[0] - '0'), y >= 'a' ? double('a' - 1 - y) : double(y - '0')};
 }
 
-void blend(Picture& picture, int x, int y, double part, glm::dvec3 srgb) {
-    uint8_t* pixel = &picture.rgba[4 * (size_t(y) * picture.width + size_t(x))];
-    for (int c = 0; c < 3; ++c) pixel[c] = uint8_t(std::lround(glm::mix(double(pixel[c]), 255 * srgb[c], part)));
-    pixel[3] = uint8_t(std::lround(glm::mix(double(pixel[3]), 255.0, part)));
-}
-
 }  // namespace
 
 double textWidth(std::string_view text, double height) { return double(text.size()) * kAdvance * height / kCapital; }
@@ -102,25 +96,15 @@ void drawText(Picture& picture, std::string_view text, glm::dvec2 at, double hei
 }
 
 void drawLine(Picture& picture, glm::dvec2 from, glm::dvec2 to, double width, glm::dvec3 srgb) {
-    const glm::ivec2 last(int(picture.width) - 1, int(picture.height) - 1);
-    const glm::ivec2 low = glm::max(glm::ivec2(glm::floor(glm::min(from, to) - width - 1.0)), 0);
-    const glm::ivec2 high = glm::min(glm::ivec2(glm::ceil(glm::max(from, to) + width + 1.0)), last);
-    const glm::dvec2 along = to - from;
-    const double length2 = glm::dot(along, along);
-    for (int y = low.y; y <= high.y; ++y)
-        for (int x = low.x; x <= high.x; ++x) {
-            const glm::dvec2 p = glm::dvec2(x, y) + 0.5 - from;
-            const double t = length2 > 0 ? std::clamp(glm::dot(p, along) / length2, 0.0, 1.0) : 0;
-            const double part = std::clamp(width / 2 + 0.5 - glm::length(p - t * along), 0.0, 1.0);
-            if (part > 0) blend(picture, x, y, part, srgb);
-        }
+    visitLine({from, to}, width, {int(picture.width), int(picture.height)},
+              [&](glm::ivec2 pixel, float part) { blend(picture, pixel, srgb, part); });
 }
 
-void fillRectangle(Picture& picture, glm::ivec2 low, glm::ivec2 high, glm::dvec3 srgb) {
+void fillRectangle(Picture& picture, glm::ivec2 low, glm::ivec2 high, glm::dvec3 srgb, float opacity) {
     low = glm::max(low, 0);
     high = glm::min(high, glm::ivec2(int(picture.width), int(picture.height)));
     for (int y = low.y; y < high.y; ++y)
-        for (int x = low.x; x < high.x; ++x) blend(picture, x, y, 1, srgb);
+        for (int x = low.x; x < high.x; ++x) blend(picture, {x, y}, srgb, opacity);
 }
 
 }  // namespace vcp

@@ -1,0 +1,28 @@
+// Lengths as text, with units.
+#include "viewer/annotation/length_unit.h"
+
+#include <tuple>
+
+#include <gtest/gtest.h>
+
+namespace vcp {
+namespace {
+
+TEST(LengthUnit, LengthsAreWrittenInTheWorldsUnitOrInOneThatReadsBetter) {
+    const std::tuple<double, const char*, const char*> cases[] = {
+        {12.3456, "mm", "12.35 mm"}, {9999, "mm", "9999 mm"}, {25000, "mm", "25 m"},    {2.5e7, "mm", "25 km"},
+        {0.002, "mm", "2 um"},       {0.25, "cm", "0.25 cm"}, {0.005, "cm", "50 um"},   {3e-9, "m", "0.003 um"},
+        {0.0004, "km", "400 mm"},    {0, "mm", "0 mm"},       {50000, "ft", "5e+04 ft"}};
+    for (const auto& [length, unit, text] : cases) EXPECT_EQ(lengthText(length, unitNamed(unit)), text);
+    EXPECT_EQ(lengthText(25000, {}), "2.5e+04");
+    EXPECT_FALSE(unitNamed("furlong"));
+}
+
+// Powers of ten may round down to just below one.
+TEST(LengthUnit, AWholeMetreIsNoThousandMillimetres) {
+    EXPECT_EQ(lengthText(1e-3, unitNamed("km")), "1 m");
+    EXPECT_EQ(lengthText(1e6, unitNamed("um")), "1 m");
+}
+
+}  // namespace
+}  // namespace vcp
