@@ -16,6 +16,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -23,6 +24,8 @@
 #include "octree/io/result.h"
 
 namespace vcp {
+
+class MeshSample;
 
 /// Auto: all colours there are. Texture: materials and their images, not the vertices' colours.
 enum class ColourChoice { Auto, Vertex, Texture, None };
@@ -56,6 +59,8 @@ struct BuildOptions {
     double checkpointSeconds = 15;  ///< least time between checkpoints, which make what is done durable
     ColourChoice colour = ColourChoice::Auto;
     CoarseLeaves coarseLeaves = CoarseLeaves::Slabs;
+    /// Is given what is read, for a picture meanwhile (mesh_sample.h); nothing where work is resumed. May be empty.
+    std::shared_ptr<MeshSample> sample;
     /// Called from one thread at a time, about ten times a second and whenever a stage begins. Returning false cancels;
     /// then it is not called again. May be empty.
     std::function<bool(const BuildProgress&)> progress;

@@ -14,6 +14,7 @@
 #include "builder/lattice/exact_sum.h"
 #include "builder/lattice/lattice_mesh.h"
 #include "builder/mesh/open_mesh.h"
+#include "builder/mesh_sample.h"
 #include "builder/vertex_join.h"
 #include "octree/surface/leaf_math.h"
 #include "octree/vcp_file.h"
@@ -48,7 +49,8 @@ Error badInput(const BuildOptions& options, std::string message) {
 /// Measures triangles and packs them into the soup. Other threads of the calling arena code the blocks meanwhile.
 class SoupWriter {
 public:
-    explicit SoupWriter(Soup& soup) : soup_(soup) {
+    /// `sample` is given each triangle; null: there is none.
+    SoupWriter(Soup& soup, MeshSample* sample) : soup_(soup), sample_(sample) {
         measures_.boundsMin = glm::dvec3(std::numeric_limits<double>::infinity());
         measures_.boundsMax = -measures_.boundsMin;
     }
@@ -72,6 +74,7 @@ public:
             ++measures_.degenerateTriangles;
             return {};
         }
+        if (sample_ != nullptr) sample_->addTriangle(t);
         const double longest = longestEdge(a, b, c);
         if (std::isfinite(twice) && std::isfinite(longest)) {
             area_.add(twice / 2);
@@ -140,6 +143,7 @@ private:
     static constexpr size_t kBatch = 4096, kMostBatches = 8;
 
     Soup& soup_;
+    MeshSample* sample_;
     SoupMeasures measures_;
     ExactSum area_, length_;
     bool tooLarge_ = false;
@@ -164,7 +168,7 @@ Result<SoupMeasures> readInputs(const BuildOptions& options, TempSpace& space, u
         std::error_code ignored;
         if (const auto size = std::filesystem::file_size(path, ignored); !ignored) totalBytes += size;
     }
-    SoupWriter writer(soup);
+    SoupWriter writer(soup, options.sample.get());
     MeshChunk chunk;
     for (const auto& path : options.inputs) {
         VCP_TRY_ASSIGN(auto stream, openMesh(path, meshOptionsOf(options)));
@@ -174,6 +178,7 @@ Result<SoupMeasures> readInputs(const BuildOptions& options, TempSpace& space, u
             VCP_TRY_ASSIGN(auto more, stream->next(chunk));
             if (!more) break;
             hasVertexColours |= !chunk.colours.empty();
+            if (options.sample) options.sample->addVertices(chunk.positions);
             VCP_TRY(join.add(chunk, materialBase));
             const uint64_t bytes = doneBytes + stream->bytesRead();
             // A pipe does not say how many bytes will come.

@@ -163,6 +163,12 @@ Result<void> Viewer::setBudget(uint64_t bytes) {
     return {};
 }
 
+void Viewer::foresee(const Box& bounds, const OrbitCamera& camera) {
+    isForeseen_ = true;
+    bounds_ = bounds;
+    camera_ = camera;
+}
+
 void Viewer::resize(glm::ivec2 size) {
     mostSamples_ = kMostSamples;
     size_ = glm::clamp(size, glm::ivec2(0), glm::ivec2(16384));
@@ -208,7 +214,7 @@ glm::dvec3 Viewer::pointOfInterest(glm::dvec2 pixel) {
 }
 
 void Viewer::press(MouseButton button, glm::dvec2 pixel, Modifiers modifiers) {
-    if (drag_ != Drag::None || !hasSize() || !isOpen_) return;
+    if (drag_ != Drag::None || !hasSize() || !(isOpen_ || isForeseen_)) return;
     move_.reset();
     dragButton_ = button;
     cursor_ = pixel;
@@ -305,7 +311,7 @@ bool Viewer::cancelSectionDrag() {
 }
 
 void Viewer::scroll(glm::dvec2 pixel, double steps, bool shift) {
-    if (!hasSize() || !isOpen_ || steps == 0) return;
+    if (!hasSize() || !(isOpen_ || isForeseen_) || steps == 0) return;
     if (shift && !sections_.empty()) return moveSections(steps);
     move_.reset();
     if (isFlying_) {

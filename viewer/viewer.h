@@ -130,6 +130,10 @@ public:
     void show(const std::vector<PlacedDataset>& datasets, const MesoScene& surfaces, const OrbitCamera& camera,
               std::string name);
 
+    /// Lets the camera be moved about `bounds` where nothing is open: for a host that shows something itself until
+    /// open().
+    void foresee(const Box& bounds, const OrbitCamera& camera);
+
     /// Sets the picture's size. Either side 0: minimized, nothing is drawn.
     void resize(glm::ivec2 size);
 
@@ -263,7 +267,8 @@ private:
     std::unique_ptr<Renderer> renderer_;
     std::shared_ptr<const Dataset> dataset_;
     bool isOpen_ = false;
-    bool isPaper_ = false;  // all datasets are of the method `paper`
+    bool isForeseen_ = false;  // the camera may be moved, though nothing is open
+    bool isPaper_ = false;     // all datasets are of the method `paper`
     Box bounds_;
     OrbitCamera camera_, home_;
     Shading shading_;

@@ -35,7 +35,8 @@ constexpr KindName kKinds[] = {
     {OutputKind::Text, ".csv", "text"},         {OutputKind::Text, ".md", "text"},
     {OutputKind::Ply, ".ply", "a PLY mesh"},    {OutputKind::Obj, ".obj", "an OBJ mesh"},
     {OutputKind::Stl, ".stl", "an STL mesh"},   {OutputKind::Glb, ".glb", "a GLB"},
-    {OutputKind::Dxf, ".dxf", "a DXF"},
+    {OutputKind::Dxf, ".dxf", "a DXF"},         {OutputKind::Mp4, ".mp4", "an MP4 video"},
+    {OutputKind::Webm, ".webm", "a WebM video"},
 };
 
 const char* wordsFor(OutputKind kind) {
@@ -189,6 +190,10 @@ bool beginsLike(OutputKind kind, std::span<const std::byte> start) {
             return text.starts_with("glTF");
         case OutputKind::Dxf:
             return text.starts_with("999") || text.starts_with("  0") || text.starts_with("0\n");
+        case OutputKind::Mp4:
+            return text.size() >= 8 && text.substr(4, 4) == "ftyp";
+        case OutputKind::Webm:
+            return text.starts_with("\x1a\x45\xdf\xa3");
     }
     return false;
 }

@@ -27,7 +27,7 @@
 namespace vcp {
 
 /// What a file holds, as far as its first bytes tell.
-enum class OutputKind { Dataset, Asset, Png, Pfm, JsonText, Svg, Text, Ply, Obj, Stl, Glb, Dxf };
+enum class OutputKind { Dataset, Asset, Png, Pfm, JsonText, Svg, Text, Ply, Obj, Stl, Glb, Dxf, Mp4, Webm };
 
 struct OutputRules {
     bool overwrite = false;  ///< also files of another kind, and write-protected ones, may be replaced

@@ -33,6 +33,7 @@ Json secondsOrNull(const std::optional<double>& seconds) { return seconds ? Json
 Json toJson(const WindowReport& report) {
     const ViewerStatus& status = report.status;
     return {{"window_seconds", secondsOrNull(report.windowSeconds)},
+            {"preview_seconds", secondsOrNull(report.previewSeconds)},
             {"first_picture_seconds", secondsOrNull(report.firstPictureSeconds)},
             {"settled_seconds", secondsOrNull(report.settledSeconds)},
             {"frames", report.framesDrawn},

@@ -21,11 +21,6 @@ int terminalColumns(std::FILE* out) {
     return size.ws_col;
 }
 
-/// Returns a time that is left: more than a guess of whole seconds it is not.
-std::string timeLeft(double seconds) {
-    return seconds < 59 ? fmt::format("{:.0f} s", std::ceil(seconds)) : formatSeconds(std::ceil(seconds));
-}
-
 // Progress that stands still is shown again after so long, with its new counts.
 constexpr double kJsonSeconds = 2, kPlainSeconds = 30, kBarSeconds = 0.5;
 
@@ -45,13 +40,11 @@ void ProgressDisplay::update(std::string_view stage, double fraction, const Prog
     if (style_ == ProgressStyle::None) return;
     fraction = std::clamp(fraction, 0.0, 1.0);
     const double elapsed = seconds();
-    // The first moments say little about the rest.
-    const bool isKnown = elapsed > 1 && fraction > 0.01;
-    const double left = isKnown ? elapsed * (1 - fraction) / fraction : 0;
+    const std::optional<double> left = secondsLeft(elapsed, fraction);
     std::string facts;
     if (details.triangles > 0) facts += fmt::format(", {} triangles", formatCount(details.triangles));
     if (details.tempBytes > 0) facts += fmt::format(", {} temporary", formatBytes(details.tempBytes));
-    if (isKnown) facts += fmt::format(", {} left", timeLeft(left));
+    if (left) facts += fmt::format(", {} left", formatTimeLeft(*left));
     if (style_ == ProgressStyle::Bar) return drawBar(stage, fraction, facts);
 
     const int steps = style_ == ProgressStyle::Json ? 100 : 10;
@@ -64,7 +57,7 @@ void ProgressDisplay::update(std::string_view stage, double fraction, const Prog
     std::string line;
     if (style_ == ProgressStyle::Json) {
         nlohmann::ordered_json json = {{"stage", stage}, {"fraction", fraction}, {"seconds", elapsed}};
-        if (isKnown) json["seconds_left"] = left;
+        if (left) json["seconds_left"] = *left;
         if (details.triangles > 0) {
             json["triangles"] = details.triangles;
             json["triangles_per_second"] = fraction * double(details.triangles) / std::max(elapsed, 1e-9);

@@ -164,4 +164,13 @@ std::string formatSeconds(double seconds) {
     return fmt::format("{} h {:02} min", whole / 3600, whole / 60 % 60);
 }
 
+std::optional<double> secondsLeft(double seconds, double fraction) {
+    if (!(seconds > 1 && fraction > 0.01)) return std::nullopt;
+    return seconds * (1 - fraction) / fraction;
+}
+
+std::string formatTimeLeft(double seconds) {
+    return seconds < 59 ? fmt::format("{:.0f} s", std::ceil(seconds)) : formatSeconds(std::ceil(seconds));
+}
+
 }  // namespace vcp

@@ -75,4 +75,11 @@ std::string formatLength(double length);
 /// Returns a text such as "0.82 s" or "3 min 05 s".
 std::string formatSeconds(double seconds);
 
+/// Returns about how long work goes on of which a fraction took `seconds`; nothing in its first moments, which say
+/// little about the rest.
+std::optional<double> secondsLeft(double seconds, double fraction);
+
+/// Returns such a time as a text: it is no more than a guess of whole seconds.
+std::string formatTimeLeft(double seconds);
+
 }  // namespace vcp

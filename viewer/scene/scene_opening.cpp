@@ -154,10 +154,11 @@ Result<OpenedScene> SceneOpening::take() { return *std::exchange(opened_, std::n
 Result<OpenedScene> SceneOpening::open() {
     // The display goes with the work: it is taken away before an error is shown.
     BuildOptions build = std::exchange(build_, {});
+    if (!inputs_.empty() && !isSceneName(inputs_.front())) build.sample = sample_;
     build.progress = [this, told = std::move(build.progress)](const BuildProgress& at) {
         const bool goesOn = !told || told(at);
         const std::lock_guard lock(mutex_);
-        progress_ = {at.stage, at.fraction, at.triangles};
+        progress_ = {at.stage, at.fraction, at.triangles, at.seconds};
         return goesOn && !*cancelled_;
     };
     return openScene(inputs_, build, access_);

@@ -13,6 +13,7 @@
 #include <thread>
 #include <vector>
 
+#include "builder/mesh_sample.h"
 #include "render/view/renderer.h"
 #include "streaming/page_source.h"
 #include "viewer/annotation/legend.h"
@@ -99,6 +100,7 @@ public:
         std::string stage;
         double fraction = 0;
         uint64_t triangles = 0;
+        double seconds = 0;  ///< since the build began
     };
 
     /// Takes what openScene takes. `build.progress` is called in the thread, and destroyed when the work is done.
@@ -111,6 +113,8 @@ public:
     [[nodiscard]] Progress progress() const;
     void cancel() { *cancelled_ = true; }
     [[nodiscard]] bool isDone() const { return done_; }
+    /// What was read of the meshes that are being built; nothing of a scene's, which lie where the scene places them.
+    [[nodiscard]] const MeshSample& sample() const { return *sample_; }
     /// Returns what was opened; call it once, when it is done. Errors: those of openScene; Cancelled; those of
     /// caught().
     Result<OpenedScene> take();
@@ -121,6 +125,7 @@ private:
     std::vector<std::string> inputs_;
     BuildOptions build_;  // used by the thread, as is access_
     SourceAccess access_;
+    const std::shared_ptr<MeshSample> sample_ = std::make_shared<MeshSample>();
     const std::shared_ptr<std::atomic<bool>> cancelled_ =
         std::make_shared<std::atomic<bool>>(false);  // shared with readers, which live longer
     std::atomic<bool> done_ = false;

@@ -37,6 +37,8 @@ void Interface::layOut(glm::ivec2 framebuffer, const Look& look) {
         drawSectionHandles();
         if (session_->showsFeedback()) drawFeedback();
         if (session_->user().panel) layOutPanel();
+    } else if (MeshPreview* const preview = session_->preview()) {
+        preview->draw(*ImGui::GetBackgroundDrawList(), session_->viewer().pictureOf(framebuffer), units(2));
     } else if (!session_->opening()) {
         layOutWelcome();
     }

@@ -99,7 +99,10 @@ private:
     void layOutSaving(const ViewSession::SavingProgress& saving);
     /// Begins a card in the middle of the window, at most so many units wide and high; 0: as high as its contents.
     bool beginCard(const char* name, float width, float height);
-    /// Ends it, and what beginCard() set.
+    /// Begins a small card in the lower right corner of the picture. Returns false, and begins nothing, where there is
+    /// no room for it.
+    bool beginNote(const char* name);
+    /// Ends either, and what was set for it.
     void endCard();
 
     void drawAnnotations() const;

@@ -231,36 +231,48 @@ void Interface::layOutRecent(float width, size_t columns) {
     }
 }
 
+bool Interface::beginNote(const char* name) {
+    const float width = std::min(units(256), size_.x - panelWidth_ - units(32));
+    if (width < units(32)) return false;
+    ImGui::SetNextWindowPos({size_.x - panelWidth_ - units(16), size_.y - statusHeight_ - units(16)}, ImGuiCond_Always,
+                            {1, 1});
+    ImGui::SetNextWindowSizeConstraints({width, 0}, {width, size_.y});
+    ImGui::PushStyleColor(ImGuiCol_WindowBg, look_->palette.raised);
+    ImGui::PushStyleVar(ImGuiStyleVar_WindowPadding, ImVec2(units(16), units(16)));
+    ImGui::Begin(name, nullptr, kCard | ImGuiWindowFlags_NoScrollbar | ImGuiWindowFlags_AlwaysAutoResize);
+    return true;
+}
+
 void Interface::layOutOpening() {
     SceneOpening& opening = *session_->opening();
     const SceneOpening::Progress progress = opening.progress();
-    beginCard("opening", 360, 0);
+    // What is seen of the mesh is not covered.
+    if (session_->preview() == nullptr)
+        beginCard("opening", 360, 0);
+    else if (!beginNote("opening a mesh"))
+        return;
     const float width = ImGui::GetContentRegionAvail().x;
     text(look_->strong, look_->palette.ink, fitted(nameOf(opening.inputs()), width));
     const std::string stage = progress.stage.empty() ? "opening" : progress.stage;
-    valueRow(*look_, fitted(stage, 0.7f * width).c_str(), fmt::format("{:.0f} %", 100 * progress.fraction));
+    valueRow(*look_, fitted(stage, 0.5f * width).c_str(), fmt::format("{:.0f} %", 100 * progress.fraction));
     progressBar(*look_, progress.fraction);
     if (progress.triangles > 0) valueRow(*look_, "Triangles", formatCount(progress.triangles));
+    if (const auto left = secondsLeft(progress.seconds, progress.fraction))
+        valueRow(*look_, "Time left", formatTimeLeft(*left));
     if (textButton(*look_, icon::kClose, "Cancel", {"", "Esc"})) opening.cancel();
     endCard();
 }
 
 void Interface::layOutSaving(const ViewSession::SavingProgress& saving) {
-    const float width = std::min(units(360), size_.x - panelWidth_ - units(16));
-    if (width < units(32)) return;
-    ImGui::SetNextWindowPos({0.5f * (size_.x - panelWidth_), size_.y - statusHeight_ - units(16)}, ImGuiCond_Always,
-                            {0.5f, 1});
-    ImGui::SetNextWindowSizeConstraints({width, 0}, {width, size_.y});
-    ImGui::PushStyleColor(ImGuiCol_WindowBg, look_->palette.raised);
-    ImGui::Begin("saving", nullptr, kCard | ImGuiWindowFlags_NoScrollbar | ImGuiWindowFlags_AlwaysAutoResize);
+    if (!beginNote("saving")) return;
+    const float width = ImGui::GetContentRegionAvail().x;
     const std::string count =
         saving.pictures > 1 ? fmt::format("{} of {} pictures", saving.finished, saving.pictures) : std::string();
     valueRow(*look_, fitted("Saving " + saving.name, 0.5f * width).c_str(),
              count.empty() ? fmt::format("{:.0f} %", 100 * saving.fraction) : count);
     progressBar(*look_, saving.fraction);
     if (textButton(*look_, icon::kClose, "Cancel", {"", "Esc"})) session_->cancelSaving();
-    ImGui::End();
-    ImGui::PopStyleColor();
+    endCard();
 }
 
 }  // namespace vcp

@@ -95,6 +95,8 @@ void ViewSession::open(std::vector<std::string> inputs) {
     if (inputs.empty()) return;
     dismissProblem();
     opening_.reset();
+    preview_ = {};
+    framed_.reset();
     BuildOptions build = options_.build;
     build.progress = options_.makeProgress ? options_.makeProgress() : nullptr;
     opening_ = std::make_unique<SceneOpening>(std::move(inputs), std::move(build), options_.render.source);
@@ -127,6 +129,7 @@ Result<void> ViewSession::show(const OpenedScene& open, const std::vector<std::s
             say(asked.error().line());
         viewer_->setSections(options_.render.sectionPlanes(open.bounds()));
         if (options_.render.isFit() && open.file.camera) camera = *open.file.camera;
+        if (isPreviewMoved()) camera = viewer_->camera();
     } else {
         viewer_->setSections({});
         if (open.file.camera) camera = *open.file.camera;
@@ -167,8 +170,20 @@ Result<void> ViewSession::show(const OpenedScene& open, const std::vector<std::s
     return {};
 }
 
+/// Shows what was read of the mesh, where nothing else is shown.
+void ViewSession::takePreview(double now) {
+    if (!opening_ || viewer_->isOpen() || !preview_.update(opening_->sample(), now)) return;
+    if (isPreviewMoved()) return;
+    OrbitCamera camera;
+    camera.up = up_;
+    camera.look(View::Fit, preview_.bounds(), glm::max(viewer_->size(), glm::ivec2(1)), viewer_->covered());
+    viewer_->foresee(preview_.bounds(), camera);
+    framed_ = viewer_->camera().current();
+}
+
 Result<NextStep> ViewSession::update(double now) {
     takeOpened();
+    takePreview(now);
     takePicked();
     goOnSaving();
     noteChanges();

@@ -20,6 +20,7 @@
 #include "viewer/scene/scene_opening.h"
 #include "viewer/viewer.h"
 #include "viewer/window/measurement.h"
+#include "viewer/window/mesh_preview.h"
 #include "viewer/window/user_settings.h"
 
 namespace vcp {
@@ -72,6 +73,8 @@ public:
     void open(std::vector<std::string> inputs);
     /// Returns what is being opened; null when nothing is.
     [[nodiscard]] SceneOpening* opening() { return opening_.get(); }
+    /// Returns what was read of the mesh that is being opened; null where nothing was, or a dataset is shown meanwhile.
+    [[nodiscard]] MeshPreview* preview() { return opening_ && preview_.isShown() ? &preview_ : nullptr; }
 
     /// Does Viewer::update, and takes in what was opened or picked meanwhile.
     Result<NextStep> update(double now);
@@ -157,6 +160,8 @@ private:
     void noteChanges();
     void useThemesBackground();
     void takeOpened();
+    void takePreview(double now);
+    [[nodiscard]] bool isPreviewMoved() const { return framed_ && viewer_->camera().current() != *framed_; }
     Result<void> show(const OpenedScene& open, const std::vector<std::string>& inputs);
     void takePicked();
     void endPick();
@@ -173,7 +178,9 @@ private:
     Looks seenLooks_;  // as of the last update
     UpAxis up_;        // for what is opened next
     std::unique_ptr<SceneOpening> opening_;
-    std::string shown_;  // rememberedName of what is shown; empty: nothing
+    MeshPreview preview_;
+    std::optional<Camera> framed_;  // how the preview was framed last; a person may have moved the camera since
+    std::string shown_;             // rememberedName of what is shown; empty: nothing
     bool wasShown_ = false, showsFeedback_ = false, hasSceneLight_ = false;
     std::string problem_, note_;
     double notedAt_;  // time of the update that saw the note first; not a number until then

@@ -154,6 +154,7 @@ public:
             if (!report.windowSeconds) report.windowSeconds = seconds();
             const bool isShown =
                 viewer.isOpen() && (viewer.status().frame.pagesInCut > 0 || viewer.status().frame.surfaceBytes > 0);
+            if (session_->preview() != nullptr && !report.previewSeconds) report.previewSeconds = seconds();
             if (isShown && !report.firstPictureSeconds) report.firstPictureSeconds = seconds();
             if (isShown && viewer.status().update.settled && !report.settledSeconds) report.settledSeconds = seconds();
             wait(next);

@@ -27,6 +27,7 @@ struct WindowOptions {
 /// What happened while the window was open; times from the call of showWindow.
 struct WindowReport {
     std::optional<double> windowSeconds;        ///< something was on the screen
+    std::optional<double> previewSeconds;       ///< something of a mesh that is being built
     std::optional<double> firstPictureSeconds;  ///< first picture of a dataset; absent when it was closed before
     std::optional<double> settledSeconds;       ///< the first settled picture
     uint64_t framesDrawn = 0;

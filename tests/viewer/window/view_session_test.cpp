@@ -2,7 +2,9 @@
 #include "viewer/window/view_session.h"
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
+#include <cstdlib>
 #include <fstream>
 #include <functional>
 #include <set>
@@ -292,6 +294,83 @@ TEST_F(RememberingSessionTest, ScenesBookmarksAndPastedCamerasTurnNothingOver) {
     EXPECT_EQ(second.session->viewer().camera().up, UpAxis::Y);
     EXPECT_TRUE(second.session->viewer().sections().empty());
     EXPECT_TRUE(second.session->viewer().shading().lightFollowsCamera);
+}
+
+/// A session whose builds stand still once they have read, until they are let go.
+class PreviewSessionTest : public BuiltBall {
+protected:
+    void SetUp() override {
+        if (!listDevices()) GTEST_SKIP() << "no Vulkan device";
+        setenv("XDG_CACHE_HOME", (*folder_ / "cache").c_str(), 1);
+        SessionOptions options;
+        options.makeProgress = [this] {
+            return [this](const BuildProgress& at) {
+                while (at.stage == "sorting" && !isLetGo_) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+                return true;
+            };
+        };
+        auto session = ViewSession::create(options, {});
+        ASSERT_TRUE(session) << session.error().line();
+        session_ = *std::move(session);
+        session_->viewer().resize({96, 64});
+        session_->open({(*folder_ / "ball.ply").string()});
+        for (int i = 0; i < 10000 && session_->opening()->sample().snapshot().triangles.empty(); ++i) turn();
+        // What was read last is taken in as well.
+        for (int i = 0; i < 20; ++i) turn();
+    }
+    void TearDown() override {
+        isLetGo_ = true;
+        session_.reset();
+        unsetenv("XDG_CACHE_HOME");
+        fs::remove_all(*folder_ / "cache");
+    }
+    void turn() {
+        const auto next = session_->update(now_ += 0.05);
+        ASSERT_TRUE(next) << next.error().line();
+        std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+    void finish() {
+        isLetGo_ = true;
+        for (int i = 0; i < 10000 && session_->opening(); ++i) turn();
+        ASSERT_TRUE(session_->viewer().isOpen()) << session_->problem();
+    }
+
+    std::atomic<bool> isLetGo_ = false;
+    std::unique_ptr<ViewSession> session_;
+    double now_ = 0;
+};
+
+TEST_F(PreviewSessionTest, WhatWasReadIsFramedAsItWillBe) {
+    ASSERT_NE(session_->preview(), nullptr);
+    const Camera framed = session_->viewer().camera().current();
+    const Box bounds = session_->preview()->bounds();
+    finish();
+    EXPECT_EQ(session_->preview(), nullptr);
+    const Box open = session_->viewer().bounds();
+    EXPECT_LT(glm::distance(bounds.low, open.low) + glm::distance(bounds.high, open.high), 1e-6);
+    EXPECT_LT(glm::distance(framed.eye, session_->viewer().camera().current().eye), 1e-5);
+}
+
+TEST_F(PreviewSessionTest, ACameraThatWasMovedStays) {
+    ASSERT_NE(session_->preview(), nullptr);
+    const glm::dvec3 before = session_->viewer().camera().position;
+    session_->viewer().press(MouseButton::Left, {48, 32});
+    session_->viewer().move({60, 32});
+    session_->viewer().release(MouseButton::Left);
+    session_->viewer().scroll({48, 32}, 1);
+    const OrbitCamera moved = session_->viewer().camera();
+    EXPECT_GT(glm::distance(before, moved.position), 0.1);
+    finish();
+    EXPECT_EQ(session_->viewer().camera().current(), moved.current());
+}
+
+TEST_F(PreviewSessionTest, WhatIsCancelledIsGone) {
+    ASSERT_NE(session_->preview(), nullptr);
+    session_->opening()->cancel();
+    isLetGo_ = true;
+    for (int i = 0; i < 10000 && session_->opening(); ++i) turn();
+    EXPECT_EQ(session_->preview(), nullptr);
+    EXPECT_FALSE(session_->viewer().isOpen());
 }
 
 TEST(Window, ASizeIsRememberedAsItIsMadeFrom) {
