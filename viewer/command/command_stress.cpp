@@ -132,8 +132,7 @@ Command addStress(CLI::App& vcp) {
         });
     addParsed(*app, "--order", command->orders, parseOrders, "like feedback,nearest",
               "Which pages are read first: feedback (what the picture misses), error, nearest, breadth, random; of "
-              "several, the first is used and all\n"
-              "are compared on the path's last view")
+              "several, the first is used and all are compared on the path's last view")
         ->type_name("A,B")
         ->default_str("feedback");
     app->add_option("--seed", command->seed, "Of the faults and of the paths teleport and jitter")
