@@ -51,6 +51,8 @@ public:
     }
     [[nodiscard]] bool isDone() const { return count_ == 0; }
     WalkEntry next() { return stack_[size_t(--count_)]; }
+    /// Makes the box that came last the next one again.
+    void putBack(const WalkEntry& at) { stack_[size_t(count_++)] = at; }
 
     /// Pushes those children of a node that are in `met`, a bit an octant, and hold anything: last, so that it comes
     /// next, the one in the octant `nearest`, and the one across from it first.
