@@ -51,12 +51,16 @@ public:
     Result<void> draw(const HostCastOptions& options) {
         const bool averagesSky = frame_.occlusionRays > 0;
         if (averagesSky) planes_.emplace(picture_.colours.size());
+        const PictureRays& rays = layer_.rays;
+        const bool beginInEye =
+            sections_.empty() && rays.originPerX == glm::dvec3(0) && rays.originPerY == glm::dvec3(0);
+        if (layer_.marks != nullptr && beginInEye) markBegin({0, 0});
         VCP_TRY(forEachTile(picture_.size, options, [&](glm::ivec2 corner) {
             TileHits hits;
             hits.corner = corner;
             castTile(layer_.scene, layer_.rays, hits);
             if (layer_.caps) castCaps(layer_.scene, layer_.rays, hits, cameraMarks());
-            if (layer_.marks != nullptr) markPages(hits);
+            if (layer_.marks != nullptr) markPages(hits, !beginInEye);
             if (hits.any) drawTile(hits);
         }));
         if (!averagesSky) return {};
@@ -100,17 +104,20 @@ private:
                 glm::normalize(layer_.rays.directionAt(at.x, at.y))};
     }
 
-    /// Marks the pages that a tile's rays hit or begin in.
-    void markPages(const TileHits& hits) const {
-        PageMarks& marks = layer_.marks->byCamera;
+    /// Marks the page that a pixel's ray begins in: it may miss it and hit what is below.
+    void markBegin(glm::ivec2 pixel) const {
+        const CellRay ray = rayOf(pixel);
+        const KeptInterval kept = keptInterval(sections_, ray.origin, ray.direction);
+        if (!(kept.first < kept.last)) return;
+        const auto page = layer_.scene.pageAt(ray.origin + kept.first * ray.direction);
+        if (page) layer_.marks->byCamera.mark(*page);
+    }
+
+    /// Marks the pages that a tile's rays hit, and with `begins` those that they begin in.
+    void markPages(const TileHits& hits, bool begins) const {
         if (hits.any)
-            for (const HitLeaf& leaf : hits.leaves) marks.mark(leaf.page);
-        forEachPixel(hits.corner, [&](glm::ivec2 pixel, int) {
-            const CellRay ray = rayOf(pixel);
-            const KeptInterval kept = keptInterval(sections_, ray.origin, ray.direction);
-            if (!(kept.first < kept.last)) return;
-            if (const auto page = layer_.scene.pageAt(ray.origin + kept.first * ray.direction)) marks.mark(*page);
-        });
+            for (const HitLeaf& leaf : hits.leaves) layer_.marks->byCamera.mark(leaf.page);
+        if (begins) forEachPixel(hits.corner, [&](glm::ivec2 pixel, int) { markBegin(pixel); });
     }
 
     void drawTile(const TileHits& hits) {
@@ -201,22 +208,26 @@ private:
             origins[i] = lifted(hits, surface, pixel, i);
             surface.sky[i] = 0;
         });
-        LightRay rays[kTilePixels];
-        float distances[kTilePixels];
-        // The rays of one number, over the tile, begin side by side.
-        for (uint32_t number = 0; number < sky; ++number) {
+        // The rays of one number, over the tile, begin side by side; several numbers meet the same leaves.
+        constexpr uint32_t kAtOnce = 8;
+        LightRay rays[kAtOnce * kTilePixels];
+        float distances[kAtOnce * kTilePixels];
+        for (uint32_t first = 0; first < sky; first += kAtOnce) {
+            const uint32_t end = std::min(first + kAtOnce, sky);
             size_t count = 0;
-            forEachHit(hits, [&](glm::ivec2 pixel, int i) {
-                const glm::vec3 direction = f32::skyDirection(surface.normal(i), number, sky, uint32_t(pixel.x),
-                                                              uint32_t(pixel.y), frame_.sampleNumber);
-                rays[count++] = lightRay(origins[i], direction, reach);
-            });
+            for (uint32_t number = first; number < end; ++number)
+                forEachHit(hits, [&](glm::ivec2 pixel, int i) {
+                    const glm::vec3 direction = f32::skyDirection(surface.normal(i), number, sky, uint32_t(pixel.x),
+                                                                  uint32_t(pixel.y), frame_.sampleNumber);
+                    rays[count++] = lightRay(origins[i], direction, reach);
+                });
             castLightRays(layer_.scene, {rays, count}, distances, lightMarks());
             size_t next = 0;
-            forEachHit(hits, [&](glm::ivec2, int i) {
-                const float distance = distances[next++];
-                surface.sky[i] += distance < reach ? f32::skyBehind(distance / reach) : 1.0f;
-            });
+            for (uint32_t number = first; number < end; ++number)
+                forEachHit(hits, [&](glm::ivec2, int i) {
+                    const float distance = distances[next++];
+                    surface.sky[i] += distance < reach ? f32::skyBehind(distance / reach) : 1.0f;
+                });
         }
         for (float& seen : surface.sky) seen /= float(sky);
     }

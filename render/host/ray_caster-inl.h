@@ -114,7 +114,7 @@ private:
     }
 
     /// Returns the distance of the hit, or infinity.
-    [[nodiscard]] float castLeaf(const WalkEntry& at) const {
+    [[nodiscard]] float castLeaf(const WalkEntry& at) {
         const double edge = cellsOf(at.bits);
         Part part;
         if (!enterLeaf(glm::dvec3(at.corner) * kSubcell - origin_, edge, part)) return kNothing;
@@ -139,20 +139,14 @@ private:
         return f32::firstCrossing(field, part.fromWall ? wall : 0.0f, wall, f32::dipBound(node), kSteps);
     }
 
-    [[nodiscard]] float castHard(const HostScene::Page& page, const WalkEntry& at, float edge, const Part& part) const {
-        const PageView& view = *page.view;
+    [[nodiscard]] float castHard(const HostScene::Page& page, const WalkEntry& at, float edge, const Part& part) {
         const auto cell = float(1u << page.cellBits);  // page space counts in cells of the page's level
         const float edgeInCells = edge / cell;
-        // Coordinates are relative to the leaf's lowest corner.
-        constexpr int kSteps = kLatticePerCell >> kMaxSubcellDepth;
-        const glm::ivec3 corner = glm::ivec3((at.corner - page.corner) >> page.cellBits) * kSteps;
         const glm::vec3 from = part.p * edgeInCells;
         const float least = part.fromWall ? -f32::kIntervalSlack : 0.0f;
         float best = (part.last - part.first) * edgeInCells + f32::kIntervalSlack;
         bool isHit = false;
-        Triangles t;
-        for (StripWalk walk(view.strips, at.word); nextTriangles(walk, t);) {
-            loadVertices(view, corner, t);
+        forEachTriangles(page, at, [&](const TriangleVertices& t) HWY_ATTR {
             for (uint32_t rest = trianglesNear(t, from) & ((1u << t.count) - 1); rest != 0; rest &= rest - 1) {
                 const int k = std::countr_zero(rest);
                 const auto vertex = [&](int i) { return glm::vec3(t.x[i][k], t.y[i][k], t.z[i][k]); };
@@ -162,14 +156,40 @@ private:
                 best = hit.x;
                 isHit = true;
             }
-        }
+        });
         if (!isHit) return kNothing;
         return std::max(float(part.distance) + (part.first * edgeInCells + best) * cell, 0.0f);
     }
 
+    /// Calls visit(triangles) for the triangles of a hard leaf, several at a time, relative to the leaf's lowest
+    /// corner.
+    template <class Visit>
+    HWY_INLINE void forEachTriangles(const HostScene::Page& page, const WalkEntry& at, const Visit& visit) {
+        DecodedLeaf& leaf = decoded_[(at.word + 31 * at.page) % kDecodedLeaves];
+        if (leaf.page != at.page || leaf.word != at.word) {
+            constexpr int kSteps = kLatticePerCell >> kMaxSubcellDepth;
+            const glm::ivec3 corner = glm::ivec3((at.corner - page.corner) >> page.cellBits) * kSteps;
+            const PageView& view = *page.view;
+            StripWalk walk(view.strips, at.word);
+            // Of a leaf with more triangles than there is room for, only the last ones are left: it is decoded each
+            // time.
+            bool isLong = false;
+            for (leaf.count = 0; leaf.count < kDecodedParts && nextTriangles(walk, leaf.triangles[leaf.count]);) {
+                loadVertices(view, corner, leaf.triangles[leaf.count]);
+                if (++leaf.count < kDecodedParts || walk.isWhole()) continue;
+                for (const TriangleVertices& t : leaf.triangles) visit(t);
+                leaf.count = 0;
+                isLong = true;
+            }
+            leaf.page = isLong ? kNoPage : at.page;
+            leaf.word = at.word;
+        }
+        for (int i = 0; i < leaf.count; ++i) visit(leaf.triangles[i]);
+    }
+
     /// Tells which triangles the line from a point may meet: the first test of intersectTriangle (leaf_math.h), with
     /// four times its slack, a triangle a lane.
-    [[nodiscard]] uint32_t trianglesNear(const Triangles& t, glm::vec3 from) const {
+    [[nodiscard]] uint32_t trianglesNear(const TriangleVertices& t, glm::vec3 from) const {
         const Lane3 d = spread(direction_), q = spread(from);
         const Lane3 a = vertexOf(t, 0) - q, b = vertexOf(t, 1) - q, c = vertexOf(t, 2) - q;
         const Lane3 ab = b - a, bc = c - b, ca = a - c;
@@ -182,6 +202,15 @@ private:
         return ~bitsOf(misses(b, bc) | misses(c, ca) | misses(a, ab));
     }
 
+    /// The triangles of a hard leaf that a ray has met: rays that begin side by side meet the same leaves.
+    static constexpr int kDecodedParts = 16 / kLanes;
+    struct DecodedLeaf {
+        uint32_t page = kNoPage, word = 0;
+        int count;  // parts in use
+        TriangleVertices triangles[kDecodedParts];
+    };
+    static constexpr uint32_t kDecodedLeaves = 64;
+
     const HostScene& scene_;
     PageMarks* const marks_;  // or null
     SceneWalk walk_;
@@ -190,6 +219,7 @@ private:
     float reach_ = 0, from_ = 0;
     uint32_t nearest_ = 0;  // octant
     WalkEntry hit_{};
+    DecodedLeaf decoded_[kDecodedLeaves];
 };
 
 }  // namespace vcp::HWY_NAMESPACE

@@ -109,9 +109,10 @@ private:
         const double edge = cellsOf(at.bits);
         const glm::dvec3 lowest = glm::dvec3(at.corner) * kSubcell - rays_.origin;
         const uint32_t groups = open_ & groupsMet(glm::vec3(lowest + 0.5 * edge), float(0.5 * edge));
-        if (groups == 0 || !isKept(rays_, lowest, edge)) return;
+        if (groups == 0) return;
+        LeafRays leaf = leafRays(rays_, lowest, edge);
+        if (!rays_.sections.empty() && !cutLeaf(rays_, lowest, edge, leaf)) return;
         if (!haveRays_) makeGroups();
-        const LeafRays leaf = leafRays(rays_, lowest, edge);
         if (nodeType(at.word) == kNodeHard) return castHard(at, leaf, groups);
         const PageView& view = *scene_.page(at.page).view;
         if (nodeType(at.word) == kNodeSlab) {

@@ -85,17 +85,18 @@ LeafRays leafRays(const TileRays& rays, glm::dvec3 lowest, double edge) {
         1 + largest(leaf.start) - kFirstColumn * largest(leaf.startPerX) - kFirstRow * largest(leaf.startPerY);
     leaf.rounding = 0x1p-22f * reach;
     leaf.cutCount = 0;
-    for (const SectionCut& plane : rays.sections)
-        if (lowestIn(plane, lowest, edge) < kInWall * edge)
-            leaf.cuts[leaf.cutCount++] =
-                glm::vec4(glm::vec3(plane), float((plane.w - glm::dot(glm::dvec3(plane), lowest)) * perEdge));
     return leaf;
 }
 
-bool isKept(const TileRays& rays, glm::dvec3 lowest, double edge) {
-    return std::ranges::all_of(rays.sections, [&](const SectionCut& plane) {
-        return lowestIn(plane, lowest, edge) + edge * sumOf(glm::dvec3(plane)) > kInWall * edge;
-    });
+bool cutLeaf(const TileRays& rays, glm::dvec3 lowest, double edge, LeafRays& leaf) {
+    for (const SectionCut& plane : rays.sections) {
+        const glm::dvec3 normal(plane);
+        const double height = lowestIn(plane, lowest, edge);
+        if (height + edge * sumOf(normal) <= kInWall * edge) return false;
+        if (height < kInWall * edge)
+            leaf.cuts[leaf.cutCount++] = glm::vec4(normal, (plane.w - glm::dot(normal, lowest)) / edge);
+    }
+    return true;
 }
 
 }  // namespace vcp

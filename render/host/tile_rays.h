@@ -56,7 +56,7 @@ struct LeafRays {
 /// `lowest`: the leaf's lowest corner relative to the tile's origin, and `edge`: its edge, both in finest cells.
 LeafRays leafRays(const TileRays& rays, glm::dvec3 lowest, double edge);
 
-/// Tells whether section planes leave anything of such a leaf.
-bool isKept(const TileRays& rays, glm::dvec3 lowest, double edge);
+/// Notes which section planes cut such a leaf; leafRays notes none. Returns false where they leave nothing of it.
+bool cutLeaf(const TileRays& rays, glm::dvec3 lowest, double edge, LeafRays& leaf);
 
 }  // namespace vcp
