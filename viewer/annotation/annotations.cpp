@@ -77,16 +77,15 @@ public:
         return std::max(to.x, from.x + size.x + 2 * units(kPlateX));
     }
 
-    /// Draws them above each other. `free`: where what stands to the left ends; a wider legend stands above it.
+    /// Draws them above each other. `free`: where what stands to the left ends; wider legends stand above it.
     void drawLegends(double free) const {
+        double width = 0;
+        for (const Legend& legend : annotations_.legends) width = std::max(width, widthOf(legend));
+        const double left = view_.high.x - units(kInset) - width;
         double bottom = view_.high.y - units(kInset);
-        for (const Legend& legend : annotations_.legends) {
-            const double width = widthOf(legend);
-            const double left = view_.high.x - units(kInset) - width;
-            if (left < free + units(kLegendGap))
-                bottom = std::min(bottom, view_.high.y - units(kInset + kScaleBarHeight));
+        if (left < free + units(kLegendGap)) bottom -= units(kScaleBarHeight);
+        for (const Legend& legend : annotations_.legends)
             bottom = drawLegend(legend, {left, bottom}, width) - units(kLegendGap);
-        }
     }
 
 private:

@@ -1,31 +1,22 @@
 // vcp render: pictures without a window: one, one larger than the device draws at once, or a sequence.
-#include <algorithm>
-#include <chrono>
-#include <cmath>
-#include <thread>
-
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <glm/geometric.hpp>
 
-#include "builder/measure/quantile.h"
 #include "mesostructure/base/subdivision.h"
 #include "mesostructure/method.h"
 #include "render/false_colours.h"
 #include "render/host_renderer.h"
-#include "render/pixel_samples.h"
 #include "viewer/annotation/picture_canvas.h"
 #include "viewer/camera/camera_path.h"
 #include "viewer/command/build_arguments.h"
-#include "viewer/command/commands.h"
 #include "viewer/command/help_text.h"
 #include "viewer/command/interrupt.h"
-#include "viewer/command/method_panels.h"
 #include "viewer/command/parsed_option.h"
 #include "viewer/command/render_arguments.h"
+#include "viewer/command/render_command.h"
 #include "viewer/command/render_outputs.h"
 #include "viewer/picture/image_files.h"
-#include "viewer/picture/picture_sequence.h"
 #include "viewer/scene/option_values.h"
 #include "viewer/scene/scene_opening.h"
 
@@ -33,60 +24,7 @@ namespace vcp {
 
 namespace {
 
-// Pictures of more pixels are drawn in tiles: devices limit how many a buffer may hold.
-constexpr uint64_t kMostPixelsAtOnce = 8 << 20;
-constexpr uint32_t kTile = 2048;
 constexpr int kPathFrames = 120;
-constexpr std::chrono::milliseconds kWait(100);
-
-struct RenderCommand {
-    std::vector<std::string> inputs;
-    std::string output;
-    glm::ivec2 size{1920, 1200};
-    std::string depth, normals;
-    bool overwrite = false;
-    int frames = 0;  // 0: not given
-    bool settle = true;
-    uint32_t tile = 0;  // 0: not given
-    uint32_t samples = kUsualSamples;
-    bool transparent = false;
-    bool legend = false, scaleBar = false;
-    int turntable = 0;
-    std::string path;
-    int framesPerSecond = 30;
-    std::vector<std::string> methods;  // empty: those of the scene
-    std::optional<int> subdivide;
-    bool validation = false;
-    BuildOptions build;
-    RenderSettings render;
-    ReportOptions report;
-
-    /// Figures are wanted with --json, and the first frame, which compiles, would not be one.
-    [[nodiscard]] int framesToTime() const { return frames > 0 ? frames : report.json ? 5 : 0; }
-    [[nodiscard]] bool isSequence() const { return turntable > 0 || !path.empty(); }
-    [[nodiscard]] bool isVideo() const { return isVideoPath(output); }
-    /// Returns the name of a picture's file, for one of the command's outputs.
-    [[nodiscard]] std::filesystem::path fileOf(const std::string& name, size_t picture) const {
-        return isSequence() && !isVideoPath(name) ? numbered(name, picture) : std::filesystem::path(name);
-    }
-    [[nodiscard]] bool isTiled(const FrameRequest& request) const {
-        return tile > 0 || isSequence() || uint64_t{request.width} * request.height > kMostPixelsAtOnce;
-    }
-};
-
-/// What the frames cost and showed.
-struct Drawing {
-    UpdateResult update;
-    FrameStats stats;         ///< statistics of the last frame
-    double firstFrameMs = 0;  ///< time of the frame before those, with what is compiled on first use
-    std::vector<double> frameMs;
-    uint32_t samples = 1;
-    double samplesMs = 0;  ///< time of all samples of the picture together
-
-    /// Returns the median of the timed frames, or the time of the first where none was timed.
-    [[nodiscard]] double medianMs() const { return frameMs.empty() ? firstFrameMs : upperQuantile(frameMs, 0.5); }
-    [[nodiscard]] double raysPerSecond() const { return double(stats.rays) / std::max(1e-3 * medianMs(), 1e-9); }
-};
 
 /// Whether the middle of the background is nearer to black than to white, as people see it.
 bool hasDarkBackground(const Shading& shading) {
@@ -95,134 +33,9 @@ bool hasDarkBackground(const Shading& shading) {
     return glm::dot(middle, glm::vec3(0.2126f, 0.7152f, 0.0722f)) < kMiddleGrey;
 }
 
-/// Without --settle: updates until the coarsest page is there, and draws what there is.
-Result<SettledFrame> drawWhenDrawable(PictureRenderer& renderer, const FrameRequest& request) {
-    for (;;) {
-        VCP_TRY_ASSIGN(auto update, renderer.update(request));
-        if (update.drawable || !update.problems.empty() || update.settled) {
-            VCP_TRY_ASSIGN(const auto stats, renderer.render(request, interrupted));
-            return SettledFrame{std::move(update), stats};
-        }
-        if (interrupted()) return Error::cancelled();
-        std::this_thread::sleep_for(std::chrono::milliseconds(1));
-    }
-}
-
-/// Adds the other samples to the last frame, with progress.
-Result<void> refine(PictureRenderer& renderer, const FrameRequest& request, const RenderCommand& command,
-                    Drawing& drawing) {
-    const auto began = std::chrono::steady_clock::now();
-    drawing.samples = samplesOf(request, command.samples);
-    ProgressDisplay display(command.report.progressStyle(), stderr);
-    VCP_TRY(renderer.refineTo(drawing.samples, request, interrupted, [&](uint32_t samples) {
-        display.update("drawing samples", double(samples) / drawing.samples);
-    }));
-    const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - began;
-    drawing.samplesMs = drawing.medianMs() + took.count();
-    return {};
-}
-
-Result<Drawing> draw(PictureRenderer& renderer, const FrameRequest& request, const RenderCommand& command) {
-    VCP_TRY_ASSIGN(auto first,
-                   command.settle ? renderer.drawSettled(request, interrupted) : drawWhenDrawable(renderer, request));
-    if (!first.update.problems.empty()) return first.update.problems.front();
-    Drawing drawing;
-    drawing.update = std::move(first.update);
-    drawing.stats = first.stats;
-    drawing.firstFrameMs = first.stats.msFrame;
-    for (int i = 0; i < command.framesToTime(); ++i) {
-        if (interrupted()) return Error::cancelled();
-        VCP_TRY_ASSIGN(drawing.stats, renderer.render(request, interrupted));
-        drawing.frameMs.push_back(drawing.stats.msFrame);
-    }
-    VCP_TRY(refine(renderer, request, command, drawing));
-    return drawing;
-}
-
-/// Writes depth and normals of the last frame, where they are asked for.
-Result<void> writePlanes(PictureRenderer& renderer, const FrameRequest& request, const RenderCommand& command,
-                         const OutputRules& rules) {
-    if (!command.depth.empty()) {
-        VCP_TRY_ASSIGN(const auto depth, renderer.readDepth());
-        VCP_TRY(writeDepth(depth, request.width, request.height, command.depth, rules));
-    }
-    if (!command.normals.empty()) {
-        VCP_TRY_ASSIGN(const auto normals, renderer.readNormals());
-        VCP_TRY(writeNormals(normals, request.width, request.height, command.normals, rules));
-    }
-    return {};
-}
-
-Json toJson(const Drawing& drawing, const DeviceInfo& device, const FrameRequest& request, const OrbitCamera& camera) {
-    const FrameStats& stats = drawing.stats;
-    return {{"width", request.width},
-            {"height", request.height},
-            {"frames", std::max<size_t>(drawing.frameMs.size(), 1)},
-            {"ms_per_frame", drawing.medianMs()},
-            {"first_frame_ms", drawing.firstFrameMs},
-            {"samples", drawing.samples},
-            {"ms_samples", drawing.samplesMs},
-            {"ms_beam", stats.msBeam},
-            {"ms_trace", stats.msTrace},
-            {"ms_light", stats.msLight},
-            {"ms_shade", stats.msShade},
-            {"ms_surfaces", stats.msSurfaces},
-            {"rays_per_second", drawing.raysPerSecond()},
-            {"rays", stats.rays},
-            {"traced_rays", stats.tracedRays},
-            {"hit_pixels", stats.hitPixels},
-            {"unresolved_rays", stats.unresolvedRays},
-            {"far_hits", stats.farHits},
-            {"surface_bytes", stats.surfaceBytes},
-            {"device", castBy(device, stats.onHost)},
-            {"software", device.software},
-            {"settled", drawing.update.settled},
-            {"detail", nameOf(detailOf(drawing.update, request.errorPixels))},
-            {"error_pixels", drawing.update.errorPixels},
-            {"subvolumes_in_cut", stats.pagesInCut},
-            {"resident_bytes", drawing.update.residentBytes},
-            {"bytes_read", drawing.update.bytesRead},
-            {"pipelines", stats.pipelines},
-            {"camera", Json::parse(cameraToJson(camera))}};
-}
-
-std::string summary(const RenderCommand& command, const Drawing& drawing, const DeviceInfo& device,
-                    double askedPixels) {
-    const UpdateResult& update = drawing.update;
-    const std::string error = std::isfinite(update.errorPixels) ? fmt::format("error {:.2g} pixels", update.errorPixels)
-                                                                : "no certified error";
-    const std::string samples = drawing.samples > 1 ? fmt::format(", {} samples in {}", drawing.samples,
-                                                                  formatSeconds(1e-3 * drawing.samplesMs))
-                                                    : "";
-    return fmt::format("{}: {}, {} in {:.1f} ms ({:.1f} M rays/s){} on {}{}\n  {} parts, {} of memory, {}, {}",
-                       command.output, sizeText(command.size), drawing.frameMs.empty() ? "first frame" : "a frame",
-                       drawing.medianMs(), 1e-6 * drawing.raysPerSecond(), samples,
-                       castBy(device, drawing.stats.onHost), device.software ? " (software)" : "", update.pagesInCut,
-                       formatBytes(update.residentBytes), error, textOf(detailOf(update, askedPixels)));
-}
-
-/// Prints a line about the picture, or returns its figures, for --json.
-Result<Json> report(const RenderCommand& command, const Drawing& drawing, const std::vector<MethodPanel>& panels,
-                    const DeviceInfo& device, const FrameRequest& request, const OrbitCamera& camera) {
-    if (command.report.json) {
-        Json json = toJson(drawing, device, request, camera);
-        if (panels.front().iterationsMean) json["iterations_mean"] = *panels.front().iterationsMean;
-        for (const MethodPanel& panel : panels)
-            if (!command.methods.empty()) json["methods"].push_back(toJson(panel));
-        return json;
-    }
-    std::string text = summary(command, drawing, device, request.errorPixels);
-    for (const MethodPanel& panel : panels)
-        if (!command.methods.empty()) text += "\n  " + summary(panel);
-    VCP_TRY(printLineAbout(command.output, text));
-    return Json();
-}
-
-using PaintOver = decltype(PictureSequenceOptions::paintOver);
-
 /// Returns what writes legend and scale bar over pictures from the cameras; empty where none is asked for. Errors:
 /// Usage, where there is nothing that a legend says.
-Result<PaintOver> paintOverOf(const RenderCommand& command, const LegendSubject& subject,
+Result<PaintRows> paintOverOf(const RenderCommand& command, const LegendSubject& subject,
                               const std::vector<OrbitCamera>& cameras) {
     Annotations annotations{.legends = {}, .hasScaleBar = command.scaleBar, .lines = {}, .unit = command.render.unit};
     const Shading& shading = command.render.shading;
@@ -234,7 +47,7 @@ Result<PaintOver> paintOverOf(const RenderCommand& command, const LegendSubject&
                              "--legend goes with --shading steps, cells, fetches, level or error, on files that "
                              "have such numbers"};
     }
-    if (!command.legend && !command.scaleBar) return PaintOver();
+    if (!command.legend && !command.scaleBar) return PaintRows();
     std::vector<AnnotatedView> views;
     for (const OrbitCamera& camera : cameras)
         views.push_back(annotatedPicture(camera.current(), camera.viewHeight(), glm::uvec2(command.size)));
@@ -251,61 +64,6 @@ Result<std::vector<OrbitCamera>> camerasOf(const RenderCommand& command, const O
         cameras = cameraPath(keys, command.frames > 0 ? command.frames : kPathFrames);
     }
     return cameras;
-}
-
-Json toJson(const TiledPictureStats& total, size_t pictures, uint32_t samples, const DeviceInfo& device,
-            const FrameRequest& request) {
-    return {{"width", request.width},
-            {"height", request.height},
-            {"pictures", pictures},
-            {"tiles", total.tiles},
-            {"ms_per_frame", total.ms / double(pictures)},
-            {"rays_per_second", double(total.rays) / std::max(1e-3 * total.ms, 1e-9)},
-            {"samples", samples},
-            {"rays", total.rays},
-            {"hit_pixels", total.hitPixels},
-            {"device", castBy(device, total.onHost)},
-            {"software", device.software},
-            {"settled", total.update.settled},
-            {"detail", nameOf(detailOf(total.update, request.errorPixels))},
-            {"error_pixels", total.errorPixels},
-            {"resident_bytes", total.update.residentBytes},
-            {"bytes_read", total.update.bytesRead}};
-}
-
-/// Makes pictures in tiles and sequences, with progress; when it is cancelled, finished pictures stay. Returns their
-/// figures for --json, else it prints a line.
-Result<Json> makeTiled(PictureRenderer& renderer, const FrameRequest& request, const std::vector<OrbitCamera>& cameras,
-                       const PaintOver& paintOver, const RenderCommand& command, const OutputRules& rules) {
-    ProgressDisplay display(command.report.progressStyle(), stderr);
-    std::vector<Camera> current;
-    for (const OrbitCamera& each : cameras) current.push_back(each.current());
-    PictureSequence sequence(renderer, {.request = request,
-                                        .cameras = std::move(current),
-                                        .files = {command.output, command.depth, command.normals},
-                                        .isNumbered = command.isSequence(),
-                                        .framesPerSecond = command.framesPerSecond,
-                                        .tile = command.tile > 0 ? command.tile : kTile,
-                                        .samples = command.samples,
-                                        .rules = rules,
-                                        .paintOver = paintOver,
-                                        .cancel = interrupted});
-    for (bool isDone = false; !isDone;) {
-        VCP_TRY_ASSIGN(isDone, sequence.step());
-        display.update("drawing", sequence.fraction());
-        if (!isDone && interrupted()) return Error::cancelled();
-        if (sequence.isWaiting()) renderer.waitForPage(kWait);
-    }
-    display.finish();
-    const TiledPictureStats& total = sequence.stats();
-    if (command.report.json)
-        return toJson(total, cameras.size(), samplesOf(request, command.samples), renderer.device(), request);
-    const std::string first = command.fileOf(command.output, 1).string();
-    const std::string last = command.fileOf(command.output, cameras.size()).string();
-    const std::string name = first == last ? first : fmt::format("{} to {}", first, last);
-    VCP_TRY(printLineAbout(command.output, fmt::format("{}: {}, {} tiles in {}", name, sizeText(command.size),
-                                                       total.tiles, formatSeconds(1e-3 * total.ms))));
-    return Json();
 }
 
 /// Refuses options of the output that do not go together.
@@ -351,41 +109,6 @@ Result<void> checkOutputs(const RenderCommand& command, const OutputRules& rules
         for (size_t i = 1; i <= pictures; ++i) VCP_TRY(checkOutput(command.fileOf(name, i), kind, rules));
     }
     return {};
-}
-
-Result<void> checkValidation(const PictureRenderer& renderer) {
-    const std::vector<std::string> problems = renderer.validationMessages();
-    return problems.empty() ? Result<void>() : Error{.code = ErrorCode::Device, .message = problems.front()};
-}
-
-/// Draws one picture, or one a method, side by side. Returns what report() does.
-Result<Json> drawOne(PictureRenderer& renderer, const FrameRequest& request, const OrbitCamera& camera,
-                     const PaintOver& paintOver, const RenderCommand& command, const SceneFile& scene,
-                     const OutputRules& rules) {
-    std::vector<std::string> methods = command.methods;
-    if (methods.empty()) methods.emplace_back();
-    std::optional<Drawing> first;
-    std::vector<MethodPanel> panels;
-    for (const std::string& method : methods) {
-        if (first) {
-            VCP_TRY_ASSIGN(auto surfaces, surfacesBy(method, scene));
-            VCP_TRY(renderer.setSurfaces(surfaces.surfaces));
-        }
-        VCP_TRY_ASSIGN(auto drawing, draw(renderer, request, command));
-        VCP_TRY_ASSIGN(auto panel,
-                       readPanel(renderer, method, !scene.surfaces.empty(), drawing.stats, drawing.medianMs()));
-        if (drawing.stats.unresolvedRays > 0)
-            warnOnTerminal(fmt::format(
-                "{} rays of mesostructure were given up: too many pieces of a base, or of its map, along them",
-                drawing.stats.unresolvedRays));
-        if (paintOver) paintOver(0, panel.picture, 0);
-        panels.push_back(std::move(panel));
-        if (!first) first = std::move(drawing);
-    }
-    VCP_TRY(checkValidation(renderer));
-    VCP_TRY(writePlanes(renderer, request, command, rules));
-    VCP_TRY(writePng(sideBySide(panels), command.output, rules));
-    return report(command, *first, panels, renderer.device(), request, camera);
 }
 
 /// Returns the request for the picture: options go before what the scene says, but for the light.
@@ -584,9 +307,9 @@ Command addRender(CLI::App& vcp) {
         ->type_name("N")
         ->check(CLI::Range(1, 1'000'000));
     beginGroup(*app, help_group::kLimits);
-    app->add_option(
-           "--tile", command->tile,
-           fmt::format("Draw in tiles of so many pixels a side [{} above {} M pixels]", kTile, kMostPixelsAtOnce >> 20))
+    app->add_option("--tile", command->tile,
+                    fmt::format("Draw in tiles of so many pixels a side [{} above {} M pixels]", kUsualTile,
+                                kMostPixelsAtOnce >> 20))
         ->type_name("PIXELS")
         ->check(CLI::Range(16, 8192));
     app->add_flag("--settle,!--no-settle", command->settle,

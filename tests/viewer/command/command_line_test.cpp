@@ -606,7 +606,7 @@ TEST_F(CommandLine, ADryRunIsNearWhatTheBuildThenTakes) {
             EXPECT_LE(less * is, wanted) << expected;
             EXPECT_LE(wanted, more * is) << expected;
         };
-        near("memory_bytes", "peak_rss_bytes", 0.9, 1.5);
+        near("memory_bytes", "peak_rss_bytes", 0.7, 2);  // which differs by a third from run to run
         near("temp_bytes", "temp_bytes", 0.6, 1.6);
         near("file_bytes", "file_bytes", 1, 3);
         EXPECT_GE(told["memory_cap_bytes"], told["memory_bytes"]);
