@@ -26,6 +26,10 @@ PictureRays raysOf(const FrameRequest& request) {
     rays.origin = rays.originAt(corner.x, corner.y);
     rays.direction = rays.directionAt(corner.x, corner.y);
     rays.size = {int(request.width), int(request.height)};
+    for (const SectionPlane& plane : request.sections) {
+        const double length = glm::length(plane.normal);
+        rays.sections.emplace_back(plane.normal / length, plane.offset / length);
+    }
     return rays;
 }
 
@@ -113,6 +117,7 @@ Result<void> drawDataset(const HostDataset& drawn, const FrameRequest& request, 
                           .rays = raysOf(seen),
                           .frame = frameConstants(seen, &dataset, 1, hasColour, drawn.errorPixels, drawn.placement),
                           .hasColour = hasColour,
+                          .caps = request.sectionCaps,
                           .worldPerUnit = drawn.placement.scale,
                           .number = drawn.number,
                           .marks = asked ? &marks : nullptr};
@@ -141,7 +146,6 @@ Result<void> checkHostDraws(const Dataset& dataset, const std::string& name) {
 
 Result<void> checkHostDraws(const FrameRequest& request) {
     const ShadingMode mode = request.shading.mode;
-    if (!request.sections.empty()) return unsupported("section planes");
     if (mode == ShadingMode::Steps || mode == ShadingMode::Cells || mode == ShadingMode::Fetches || request.countSteps)
         return unsupported("the work of rays");
     return {};

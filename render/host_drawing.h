@@ -1,8 +1,8 @@
 // Draws datasets with the processor (render/host/), whoever holds their pages: HostRenderer in plain memory, and
 // Renderer, on a software device, in memory that the processor sees.
 //
-// Sections, mesostructure, the march of the method `paper`, the false colours that count a shader's work, and seams
-// between levels are not drawn (docs/rays.md): each is refused as Unsupported, and never left out.
+// Mesostructure, the march of the method `paper`, the false colours that count a shader's work, and seams between
+// levels are not drawn (docs/rays.md): each is refused as Unsupported, and never left out.
 #pragma once
 
 #include <functional>

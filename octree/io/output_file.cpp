@@ -29,13 +29,13 @@ struct KindName {
     const char* words;
 };
 constexpr KindName kKinds[] = {
-    {OutputKind::Dataset, ".vcp", "a dataset"}, {OutputKind::Asset, ".meso", "a mesostructure asset"},
-    {OutputKind::Png, ".png", "a PNG"},         {OutputKind::Pfm, ".pfm", "a PFM"},
-    {OutputKind::JsonText, ".json", "JSON"},    {OutputKind::Svg, ".svg", "an SVG"},
-    {OutputKind::Text, ".csv", "text"},         {OutputKind::Text, ".md", "text"},
-    {OutputKind::Ply, ".ply", "a PLY mesh"},    {OutputKind::Obj, ".obj", "an OBJ mesh"},
-    {OutputKind::Stl, ".stl", "an STL mesh"},   {OutputKind::Glb, ".glb", "a GLB"},
-    {OutputKind::Dxf, ".dxf", "a DXF"},         {OutputKind::Mp4, ".mp4", "an MP4 video"},
+    {OutputKind::Dataset, ".vcp", "a dataset"},  {OutputKind::Asset, ".meso", "a mesostructure asset"},
+    {OutputKind::Png, ".png", "a PNG"},          {OutputKind::Pfm, ".pfm", "a PFM"},
+    {OutputKind::JsonText, ".json", "JSON"},     {OutputKind::Svg, ".svg", "an SVG"},
+    {OutputKind::Text, ".csv", "text"},          {OutputKind::Text, ".md", "text"},
+    {OutputKind::Ply, ".ply", "a PLY mesh"},     {OutputKind::Obj, ".obj", "an OBJ mesh"},
+    {OutputKind::Stl, ".stl", "an STL mesh"},    {OutputKind::Glb, ".glb", "a GLB"},
+    {OutputKind::Dxf, ".dxf", "a DXF"},          {OutputKind::Mp4, ".mp4", "an MP4 video"},
     {OutputKind::Webm, ".webm", "a WebM video"},
 };
 

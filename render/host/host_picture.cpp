@@ -14,6 +14,7 @@
 #include "render/host/hit_light.h"
 #include "render/host/hit_surface.h"
 #include "render/host/light_rays.h"
+#include "render/host/section_caps.h"
 #include "render/host/tile_shading.h"
 
 namespace vcp {
@@ -25,13 +26,13 @@ constexpr float kNothing = std::numeric_limits<float>::infinity();
 /// What is kept of each pixel until the sky that its neighbours see is known.
 struct SkyPlanes {
     explicit SkyPlanes(size_t pixels)
-        : depth(pixels, kNothing), normals(pixels), albedo(pixels), sun(pixels), sky(pixels), pages(pixels) {}
+        : depth(pixels, kNothing), normals(pixels), albedo(pixels), sun(pixels), sky(pixels), hits(pixels) {}
 
     std::vector<float> depth;  // finest cells
     std::vector<glm::vec3> normals;
     std::vector<uint32_t> albedo;  // RGBA8
     std::vector<uint8_t> sun, sky;
-    std::vector<uint32_t> pages;  // indices in the scene
+    std::vector<HostHit> hits;
 };
 
 uint8_t toByte(float x) { return uint8_t(std::lround(255 * x)); }
@@ -44,12 +45,22 @@ public:
           picture_(picture),
           isColoured_(layer.hasColour &&
                       (frame_.shadingMode == frame::kShadeLit || frame_.shadingMode == frame::kShadeUnlit)),
-          turn_(frame_.rotation.w, frame_.rotation.x, frame_.rotation.y, frame_.rotation.z) {}
+          turn_(frame_.rotation.w, frame_.rotation.x, frame_.rotation.y, frame_.rotation.z),
+          sections_(inCells(layer.rays.sections, layer.scene.grid().origin, layer.scene.grid().cell)) {}
 
     Result<void> draw(const HostCastOptions& options) {
         const bool averagesSky = frame_.occlusionRays > 0;
         if (averagesSky) planes_.emplace(picture_.colours.size());
-        VCP_TRY(castPicture(layer_.scene, layer_.rays, options, [&](const TileHits& hits) {
+        const PictureRays& rays = layer_.rays;
+        const bool beginInEye =
+            sections_.empty() && rays.originPerX == glm::dvec3(0) && rays.originPerY == glm::dvec3(0);
+        if (layer_.marks != nullptr && beginInEye) markBegin({0, 0});
+        VCP_TRY(forEachTile(picture_.size, options, [&](glm::ivec2 corner) {
+            TileHits hits;
+            hits.corner = corner;
+            castTile(layer_.scene, layer_.rays, hits);
+            if (layer_.caps) castCaps(layer_.scene, layer_.rays, hits, cameraMarks());
+            if (layer_.marks != nullptr) markPages(hits, !beginInEye);
             if (hits.any) drawTile(hits);
         }));
         if (!averagesSky) return {};
@@ -79,11 +90,37 @@ private:
     /// A pixel's edge at a depth; both in finest cells.
     [[nodiscard]] float pixelEdgeAt(float depth) const { return frame_.pixelEdge + frame_.pixelEdgePerDepth * depth; }
 
+    [[nodiscard]] PageMarks* cameraMarks() const { return layer_.marks != nullptr ? &layer_.marks->byCamera : nullptr; }
     [[nodiscard]] PageMarks* lightMarks() const { return layer_.marks != nullptr ? &layer_.marks->byLight : nullptr; }
 
-    void drawTile(const TileHits& hits) {
-        if (layer_.marks != nullptr)
+    /// A pixel's ray, in finest cells from the root's lowest corner.
+    struct CellRay {
+        glm::dvec3 origin, direction;
+    };
+    [[nodiscard]] CellRay rayOf(glm::ivec2 pixel) const {
+        const HostGrid& grid = layer_.scene.grid();
+        const glm::dvec2 at = glm::dvec2(pixel) + 0.5;
+        return {(layer_.rays.originAt(at.x, at.y) - grid.origin) / grid.cell,
+                glm::normalize(layer_.rays.directionAt(at.x, at.y))};
+    }
+
+    /// Marks the page that a pixel's ray begins in: it may miss it and hit what is below.
+    void markBegin(glm::ivec2 pixel) const {
+        const CellRay ray = rayOf(pixel);
+        const KeptInterval kept = keptInterval(sections_, ray.origin, ray.direction);
+        if (!(kept.first < kept.last)) return;
+        const auto page = layer_.scene.pageAt(ray.origin + kept.first * ray.direction);
+        if (page) layer_.marks->byCamera.mark(*page);
+    }
+
+    /// Marks the pages that a tile's rays hit, and with `begins` those that they begin in.
+    void markPages(const TileHits& hits, bool begins) const {
+        if (hits.any)
             for (const HitLeaf& leaf : hits.leaves) layer_.marks->byCamera.mark(leaf.page);
+        if (begins) forEachPixel(hits.corner, [&](glm::ivec2 pixel, int) { markBegin(pixel); });
+    }
+
+    void drawTile(const TileHits& hits) {
         TileSurface surface;
         findNormals(layer_.rays, hits, surface);
         alignas(32) uint32_t colours[kTilePixels];
@@ -113,10 +150,13 @@ private:
 
     void findAlbedo(const TileHits& hits, TileSurface& surface) const {
         setClay(surface);
-        if (!isColoured_) return;
-        // Colours have 8 bits between the passes of a device, too.
+        if (!isColoured_ && hits.onCap.none()) return;
         forEachHit(hits, [&](glm::ivec2, int i) {
-            setAlbedo(surface, i, glm::packUnorm4x8(colourAt(layer_.scene, hits, i)));
+            // Colours have 8 bits between the passes of a device, too.
+            if (hits.onCap[size_t(i)])
+                setAlbedo(surface, i, frame_.cap);
+            else if (isColoured_)
+                setAlbedo(surface, i, glm::unpackUnorm4x8(glm::packUnorm4x8(colourAt(layer_.scene, hits, i))));
         });
     }
 
@@ -125,8 +165,7 @@ private:
         std::fill_n(surface.green, kTilePixels, frame_.clay.y);
         std::fill_n(surface.blue, kTilePixels, frame_.clay.z);
     }
-    static void setAlbedo(TileSurface& surface, int i, uint32_t packed) {
-        const glm::vec4 colour = glm::unpackUnorm4x8(packed);
+    static void setAlbedo(TileSurface& surface, int i, glm::vec4 colour) {
         surface.red[i] = colour.x;
         surface.green[i] = colour.y;
         surface.blue[i] = colour.z;
@@ -134,12 +173,16 @@ private:
 
     /// Returns where rays of light begin: above the hit by more than the picture's own error and the roundings.
     [[nodiscard]] glm::dvec3 lifted(const TileHits& hits, const TileSurface& surface, glm::ivec2 pixel, int i) const {
-        const HostGrid& grid = layer_.scene.grid();
-        const glm::dvec3 origin = layer_.rays.originAt(pixel.x + 0.5, pixel.y + 0.5);
-        const glm::dvec3 direction = glm::normalize(layer_.rays.directionAt(pixel.x + 0.5, pixel.y + 0.5));
+        const CellRay ray = rayOf(pixel);
         const float lift = 0.15f + frame_.lightLift * pixelEdgeAt(depthInCells(hits.depth[i]));
-        return (origin + double(hits.depth[i]) * direction - grid.origin) / grid.cell +
+        return ray.origin + double(hits.depth[i]) / layer_.scene.grid().cell * ray.direction +
                glm::dvec3(lift * surface.normal(i));
+    }
+
+    /// Returns a ray of light, no farther than section planes leave it.
+    [[nodiscard]] LightRay lightRay(glm::dvec3 origin, glm::vec3 direction, float reach) const {
+        if (!sections_.empty()) reach = std::min(reach, float(keptInterval(sections_, origin, direction).last));
+        return {origin, direction, reach};
     }
 
     void castSun(const TileHits& hits, TileSurface& surface) const {
@@ -149,7 +192,7 @@ private:
         size_t count = 0;
         forEachHit(hits, [&](glm::ivec2 pixel, int i) {
             if (!(glm::dot(surface.normal(i), light) > 0)) return void(surface.sun[i] = 0);
-            rays[count] = {lifted(hits, surface, pixel, i), light, frame::kNoHit};
+            rays[count] = lightRay(lifted(hits, surface, pixel, i), light, frame::kNoHit);
             pixels[count++] = i;
         });
         float distances[kTilePixels];
@@ -165,22 +208,26 @@ private:
             origins[i] = lifted(hits, surface, pixel, i);
             surface.sky[i] = 0;
         });
-        LightRay rays[kTilePixels];
-        float distances[kTilePixels];
-        // The rays of one number, over the tile, begin side by side.
-        for (uint32_t number = 0; number < sky; ++number) {
+        // The rays of one number, over the tile, begin side by side; several numbers meet the same leaves.
+        constexpr uint32_t kAtOnce = 8;
+        LightRay rays[kAtOnce * kTilePixels];
+        float distances[kAtOnce * kTilePixels];
+        for (uint32_t first = 0; first < sky; first += kAtOnce) {
+            const uint32_t end = std::min(first + kAtOnce, sky);
             size_t count = 0;
-            forEachHit(hits, [&](glm::ivec2 pixel, int i) {
-                const glm::vec3 direction = f32::skyDirection(surface.normal(i), number, sky, uint32_t(pixel.x),
-                                                              uint32_t(pixel.y), frame_.sampleNumber);
-                rays[count++] = {origins[i], direction, reach};
-            });
+            for (uint32_t number = first; number < end; ++number)
+                forEachHit(hits, [&](glm::ivec2 pixel, int i) {
+                    const glm::vec3 direction = f32::skyDirection(surface.normal(i), number, sky, uint32_t(pixel.x),
+                                                                  uint32_t(pixel.y), frame_.sampleNumber);
+                    rays[count++] = lightRay(origins[i], direction, reach);
+                });
             castLightRays(layer_.scene, {rays, count}, distances, lightMarks());
             size_t next = 0;
-            forEachHit(hits, [&](glm::ivec2, int i) {
-                const float distance = distances[next++];
-                surface.sky[i] += distance < reach ? f32::skyBehind(distance / reach) : 1.0f;
-            });
+            for (uint32_t number = first; number < end; ++number)
+                forEachHit(hits, [&](glm::ivec2, int i) {
+                    const float distance = distances[next++];
+                    surface.sky[i] += distance < reach ? f32::skyBehind(distance / reach) : 1.0f;
+                });
         }
         for (float& seen : surface.sky) seen /= float(sky);
     }
@@ -193,7 +240,7 @@ private:
             if (isColoured_) planes_->albedo[to] = glm::packUnorm4x8(colourAt(layer_.scene, hits, i));
             planes_->sun[to] = toByte(surface.sun[i]);
             planes_->sky[to] = toByte(surface.sky[i]);
-            planes_->pages[to] = hits.leaves[hits.leaf[i]].page;
+            planes_->hits[to] = hitOf(hits, i);
         });
     }
 
@@ -210,7 +257,10 @@ private:
             hits.depth[i] = float(double(planes_->depth[from]) * layer_.scene.grid().cell);
             const glm::vec3 normal = planes_->normals[from];
             surface.normalX[i] = normal.x, surface.normalY[i] = normal.y, surface.normalZ[i] = normal.z;
-            if (isColoured_) setAlbedo(surface, i, planes_->albedo[from]);
+            if (planes_->hits[from].onCap != 0)
+                setAlbedo(surface, i, frame_.cap);
+            else if (isColoured_)
+                setAlbedo(surface, i, glm::unpackUnorm4x8(planes_->albedo[from]));
             surface.sun[i] = float(planes_->sun[from]) / 255;
             surface.sky[i] = skyAbout(pixel);
         });
@@ -235,6 +285,10 @@ private:
         return sum / std::max(count, 1.0f);
     }
 
+    [[nodiscard]] HostHit hitOf(const TileHits& hits, int i) const {
+        return {layer_.number, hits.leaves[hits.leaf[i]].page & INT32_MAX, hits.onCap[size_t(i)]};
+    }
+
     /// Puts a tile's hits into the picture, where they are nearer than what is there.
     void put(const TileHits& hits, const TileSurface& surface, const uint32_t* colours) {
         forEachHit(hits, [&](glm::ivec2 pixel, int i) {
@@ -244,15 +298,16 @@ private:
             picture_.depth[to] = depth;
             picture_.colours[to] = colours[i];
             picture_.normals[to] = turn_ * surface.normal(i);
-            picture_.hits[to] = {layer_.number, planes_ ? planes_->pages[to] : hits.leaves[hits.leaf[i]].page};
+            picture_.hits[to] = planes_ ? planes_->hits[to] : hitOf(hits, i);
         });
     }
 
     const HostLayer& layer_;
     const frame::FrameConstants& frame_;
     HostPicture& picture_;
-    const bool isColoured_;  // hits are shown in their own colours
-    const glm::quat turn_;   // from the dataset's axes to the world's
+    const bool isColoured_;                   // hits are shown in their own colours
+    const glm::quat turn_;                    // from the dataset's axes to the world's
+    const std::vector<SectionCut> sections_;  // finest cells from the root's lowest corner
     std::optional<SkyPlanes> planes_;
 };
 

@@ -21,7 +21,8 @@ namespace vcp {
 /// The page that a pixel shows.
 struct HostHit {
     uint32_t dataset = UINT32_MAX;  ///< number of its layer; UINT32_MAX where nothing is hit
-    uint32_t page = 0;              ///< index in the layer's scene
+    uint32_t page : 31 = 0;         ///< index in the layer's scene; of a cap, of what is behind it
+    uint32_t onCap : 1 = 0;         ///< the hit is on the cap of a section
 };
 
 /// A picture in the making: width * height elements each, row by row from the upper left.
@@ -59,13 +60,14 @@ struct HostLayer {
     PictureRays rays;               ///< in the dataset's own space
     frame::FrameConstants frame;    ///< as the shaders get it
     bool hasColour = false;         ///< hits have colours
+    bool caps = false;              ///< fills what the section planes of the rays cut open
     double worldPerUnit = 1;        ///< world units per unit of the dataset's own
     uint32_t number = 0;            ///< of the dataset in the picture
     PictureMarks* marks = nullptr;  ///< where given, gets the pages that rays hit; one for each page of the scene
 };
 
-/// Draws a layer over what is in the picture. Precondition: frame.shadingMode is none of the counts of a ray's work,
-/// and there are no section planes. Errors: Cancelled, between tiles.
+/// Draws a layer over what is in the picture. Precondition: frame.shadingMode is none of the counts of a ray's work.
+/// Errors: Cancelled, between tiles.
 Result<void> drawLayer(const HostLayer& layer, const HostCastOptions& options, HostPicture& picture);
 
 }  // namespace vcp

@@ -1,187 +1,24 @@
 // castLightRays, compiled for several instruction sets, as castTile is (tile_caster.cpp).
 #include "render/host/light_rays.h"
 
-#include <limits>
-
-#include <glm/geometric.hpp>
-
-#include "octree/surface/leaf_math.h"
 #include "render/host/instruction_sets.h"
-#include "render/host/tile_rays.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "render/host/light_rays.cpp"
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
-#include "render/host/scene_walk-inl.h"
-#include "render/host/triangles-inl.h"
+#include "render/host/ray_caster-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace vcp::HWY_NAMESPACE {
 
-/// Casts one ray after the other: eight children of a node at a time, one leaf after the other.
-class LightRayCaster {
-public:
-    LightRayCaster(const HostScene& scene, PageMarks* marks) : scene_(scene), marks_(marks), walk_(scene) {}
-
-    float cast(const LightRay& ray) {
-        origin_ = ray.origin;
-        reach_ = ray.reach;
-        nearest_ = 0;
-        for (int axis = 0; axis < 3; ++axis) {
-            const float d = ray.direction[axis];
-            direction_[axis] = std::abs(d) < 1e-18f ? 1e-18f : d;
-            nearest_ |= uint32_t(direction_[axis] < 0) << axis;
-        }
-        inverse_ = 1.0f / direction_;
-        if (marks_ != nullptr)
-            if (const auto page = scene_.pageAt(origin_)) marks_->mark(*page);
-        for (walk_.restart(); !walk_.isDone();) {
-            const WalkEntry at = walk_.next();
-            if (isNode(at)) {
-                visitNode(at);
-                continue;
-            }
-            // Boxes do not overlap and come front to back: the first hit is the nearest.
-            const float distance = castLeaf(at);
-            if (distance == kNothing) continue;
-            if (marks_ != nullptr) marks_->mark(at.page);
-            return distance < reach_ ? distance : kNothing;
-        }
-        return kNothing;
-    }
-
-private:
-    static constexpr float kNothing = std::numeric_limits<float>::infinity();
-
-    void visitNode(const WalkEntry& at) {
-        const double half = 0.5 * cellsOf(at.bits);
-        const glm::vec3 middle(glm::dvec3(at.corner) * kSubcell + half - origin_);
-        const auto octantHalf = float(0.5 * half);
-        uint32_t met = 0;
-        for (int i = 0; i < 8; i += kLanes) met |= bitsOf(isMet(octantMiddles(i, middle, octantHalf), octantHalf)) << i;
-        walk_.pushChildren(at, met, nearest_);
-    }
-
-    /// Tells which boxes the ray meets within its reach. `c`: their middles relative to its origin.
-    [[nodiscard]] Mask isMet(Lane3 c, float half) const {
-        const Lane h = mulAdd(abs(c.x) + abs(c.y) + abs(c.z), Lane(kPlaceRounding), Lane(half));
-        const Lane x0 = (c.x - h) * Lane(inverse_.x), x1 = (c.x + h) * Lane(inverse_.x);
-        const Lane y0 = (c.y - h) * Lane(inverse_.y), y1 = (c.y + h) * Lane(inverse_.y);
-        const Lane z0 = (c.z - h) * Lane(inverse_.z), z1 = (c.z + h) * Lane(inverse_.z);
-        const Lane first = max(max(min(x0, x1), min(y0, y1)), max(min(z0, z1), Lane(0.0f)));
-        const Lane last = min(min(max(x0, x1), max(y0, y1)), min(max(z0, z1), Lane(reach_)));
-        return first <= last;
-    }
-
-    /// The part of the ray that is in a leaf: from p over p + d in leaf space, and where that is along the ray.
-    struct Part {
-        glm::vec3 p, d;
-        float first, last;  // leaf edges, from the point at `distance`
-        double distance;    // finest cells
-        bool fromWall;      // the ray enters the leaf, and does not begin in it
-    };
-
-    /// Returns whether the ray passes the leaf.
-    bool enterLeaf(glm::dvec3 lowest, double edge, Part& part) const {
-        const glm::dvec3 direction(direction_);
-        part.distance = std::max(0.0, glm::dot(lowest + 0.5 * edge, direction));
-        const glm::vec3 start((part.distance * direction - lowest) / edge);
-        const auto begin = float(-part.distance / edge);
-        const float rounding = 0x1p-22f * (1 + std::max({std::abs(start.x), std::abs(start.y), std::abs(start.z)}));
-        const glm::vec3 low = (-rounding - start) * inverse_, high = (1 + rounding - start) * inverse_;
-        const glm::vec3 in = glm::min(low, high), out = glm::max(low, high);
-        part.first = std::max({in.x, in.y, in.z, begin});
-        part.last = std::min({out.x, out.y, out.z});
-        if (!(part.first <= part.last)) return false;
-        part.p = glm::clamp(start + part.first * direction_, 0.0f, 1.0f);
-        part.d = glm::clamp(start + part.last * direction_, 0.0f, 1.0f) - part.p;
-        part.fromWall = part.first > begin;
-        return true;
-    }
-
-    /// Returns the distance of the hit, or infinity.
-    [[nodiscard]] float castLeaf(const WalkEntry& at) const {
-        const double edge = cellsOf(at.bits);
-        Part part;
-        if (!enterLeaf(glm::dvec3(at.corner) * kSubcell - origin_, edge, part)) return kNothing;
-        const HostScene::Page& page = scene_.page(at.page);
-        if (nodeType(at.word) == kNodeHard) return castHard(page, at, float(edge), part);
-        const float u =
-            nodeType(at.word) == kNodeSlab ? castSlab(*page.view, at.word, part) : castSoft(*page.view, at.word, part);
-        return u < 0 ? kNothing : float(part.distance) + (part.first + u * (part.last - part.first)) * float(edge);
-    }
-
-    static float castSlab(const PageView& view, uint32_t node, const Part& part) {
-        const uint32_t code = vectorWord(view.faces, slabVector(node));
-        const float u = f32::intersectSlab(code, slabOctants(node), part.p, part.d);
-        return u > 0 || (u == 0 && part.fromWall) ? u : -1;
-    }
-
-    static float castSoft(const PageView& view, uint32_t node, const Part& part) {
-        constexpr int kSteps = 8;
-        const uint32_t axis = node >> kSoftAxisShift & 3u, face = node & kLeafIndexMask;
-        const f32::RayField field = f32::restrictToRay(view.faces[face], view.faces[face + 1], axis, part.p, part.d);
-        const float wall = f32::wallTolerance(node);
-        return f32::firstCrossing(field, part.fromWall ? wall : 0.0f, wall, f32::dipBound(node), kSteps);
-    }
-
-    [[nodiscard]] float castHard(const HostScene::Page& page, const WalkEntry& at, float edge, const Part& part) const {
-        const PageView& view = *page.view;
-        const auto cell = float(1u << page.cellBits);  // page space counts in cells of the page's level
-        const float edgeInCells = edge / cell;
-        // Coordinates are relative to the leaf's lowest corner.
-        constexpr int kSteps = kLatticePerCell >> kMaxSubcellDepth;
-        const glm::ivec3 corner = glm::ivec3((at.corner - page.corner) >> page.cellBits) * kSteps;
-        const glm::vec3 from = part.p * edgeInCells;
-        const float least = part.fromWall ? -f32::kIntervalSlack : 0.0f;
-        float best = (part.last - part.first) * edgeInCells + f32::kIntervalSlack;
-        bool isHit = false;
-        Triangles t;
-        for (StripWalk walk(view.strips, at.word); nextTriangles(walk, t);) {
-            loadVertices(view, corner, t);
-            for (uint32_t rest = trianglesNear(t, from) & ((1u << t.count) - 1); rest != 0; rest &= rest - 1) {
-                const int k = std::countr_zero(rest);
-                const auto vertex = [&](int i) { return glm::vec3(t.x[i][k], t.y[i][k], t.z[i][k]); };
-                const glm::vec3 hit =
-                    f32::intersectTriangle(from, direction_, vertex(0), vertex(1), vertex(2), f32::kTriangleSlack);
-                if (!(hit.x >= least && hit.x <= best)) continue;
-                best = hit.x;
-                isHit = true;
-            }
-        }
-        if (!isHit) return kNothing;
-        return std::max(float(part.distance) + (part.first * edgeInCells + best) * cell, 0.0f);
-    }
-
-    /// Tells which triangles the line from a point may meet: the first test of intersectTriangle (leaf_math.h), with
-    /// four times its slack, a triangle a lane.
-    [[nodiscard]] uint32_t trianglesNear(const Triangles& t, glm::vec3 from) const {
-        const Lane3 d = spread(direction_), q = spread(from);
-        const Lane3 a = vertexOf(t, 0) - q, b = vertexOf(t, 1) - q, c = vertexOf(t, 2) - q;
-        const Lane3 ab = b - a, bc = c - b, ca = a - c;
-        const Mask isBack = dot(cross(ab, ca), d) > Lane(0.0f);  // the normal is (b - a) x (c - a)
-        const auto misses = [&](Lane3 corner, Lane3 edge) HWY_ATTR {
-            const Lane volume = dot(d, cross(corner, edge)), inside = select(isBack, -volume, volume);
-            const float slack = 4 * f32::kTriangleSlack;
-            return (inside < Lane(0.0f)) & (inside * inside > Lane(slack * slack) * dot(edge, edge));
-        };
-        return ~bitsOf(misses(b, bc) | misses(c, ca) | misses(a, ab));
-    }
-
-    const HostScene& scene_;
-    PageMarks* const marks_;  // or null
-    SceneWalk walk_;
-    glm::dvec3 origin_{0};
-    glm::vec3 direction_{0}, inverse_{0};
-    float reach_ = 0;
-    uint32_t nearest_ = 0;  // octant
-};
-
 void castLightRaysHere(const HostScene& scene, std::span<const LightRay> rays, float* distances, PageMarks* marks) {
-    LightRayCaster caster(scene, marks);
-    for (const LightRay& ray : rays) *distances++ = caster.cast(ray);
+    RayCaster caster(scene, marks);
+    for (const LightRay& ray : rays) {
+        caster.begin(ray.origin, ray.direction, ray.reach);
+        *distances++ = caster.next(0);
+    }
 }
 
 }  // namespace vcp::HWY_NAMESPACE

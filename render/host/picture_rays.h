@@ -1,8 +1,12 @@
 // The rays of a picture as the host casts them: linear in the pixel's place.
 #pragma once
 
+#include <vector>
+
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
+
+#include "render/host/section_cut.h"
 
 namespace vcp {
 
@@ -13,7 +17,8 @@ namespace vcp {
 struct PictureRays {
     glm::dvec3 origin{0}, originPerX{0}, originPerY{0};
     glm::dvec3 direction{0}, directionPerX{0}, directionPerY{0};
-    glm::ivec2 size{0};  ///< pixels
+    glm::ivec2 size{0};                ///< pixels
+    std::vector<SectionCut> sections;  ///< only what all of them keep is seen; at most frame::kMaxSections
 
     [[nodiscard]] glm::dvec3 originAt(double x, double y) const { return origin + x * originPerX + y * originPerY; }
     [[nodiscard]] glm::dvec3 directionAt(double x, double y) const {

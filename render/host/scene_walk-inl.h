@@ -51,6 +51,8 @@ public:
     }
     [[nodiscard]] bool isDone() const { return count_ == 0; }
     WalkEntry next() { return stack_[size_t(--count_)]; }
+    /// Makes the box that came last the next one again.
+    void putBack(const WalkEntry& at) { stack_[size_t(count_++)] = at; }
 
     /// Pushes those children of a node that are in `met`, a bit an octant, and hold anything: last, so that it comes
     /// next, the one in the octant `nearest`, and the one across from it first.
@@ -58,19 +60,14 @@ public:
         const uint32_t bits = at.bits - 1;
         if (at.page == kNoPage) {
             const HostScene::Node& node = scene_.node(at.word);
-            for (uint32_t k = 8; k-- > 0;) {
-                const uint32_t octant = k ^ nearest;
-                if (met >> octant & 1) push(node[octant], childCorner(at, octant), bits);
-            }
+            forEachFarFirst(met, nearest,
+                            [&](uint32_t octant) HWY_ATTR { push(node[octant], childCorner(at, octant), bits); });
             return;
         }
         const uint32_t* words = &scene_.page(at.page).view->nodes[8 * (at.word & kNodePayloadMask)];
-        const uint32_t open = met & ~emptyChildren(words);
-        if (open == 0) return;
-        for (uint32_t k = 8; k-- > 0;) {
-            const uint32_t octant = k ^ nearest;
-            if (open >> octant & 1) stack_[size_t(count_++)] = {childCorner(at, octant), bits, at.page, words[octant]};
-        }
+        forEachFarFirst(met & ~emptyChildren(words), nearest, [&](uint32_t octant) HWY_ATTR {
+            stack_[size_t(count_++)] = {childCorner(at, octant), bits, at.page, words[octant]};
+        });
     }
 
 private:
@@ -83,6 +80,20 @@ private:
         const uint32_t word = isPage ? scene_.page(child.index).root : child.index;
         if (isPage && nodeType(word) == kNodeEmpty) return;
         stack_[size_t(count_++)] = {corner, bits, isPage ? child.index : kNoPage, word};
+    }
+
+    /// Calls visit(octant) for the octants in `octants`, a bit each; that in `nearest` is the last one.
+    template <class Visit>
+    HWY_INLINE static void forEachFarFirst(uint32_t octants, uint32_t nearest, const Visit& visit) {
+        // Bit k is made that of octant k ^ nearest.
+        if ((nearest & 1) != 0) octants = (octants & 0x55) << 1 | (octants >> 1 & 0x55);
+        if ((nearest & 2) != 0) octants = (octants & 0x33) << 2 | (octants >> 2 & 0x33);
+        if ((nearest & 4) != 0) octants = (octants & 0x0f) << 4 | (octants >> 4 & 0x0f);
+        while (octants != 0) {
+            const auto k = uint32_t(std::bit_width(octants)) - 1;
+            octants ^= 1u << k;
+            visit(k ^ nearest);
+        }
     }
 
     static glm::uvec3 childCorner(const WalkEntry& at, uint32_t octant) {

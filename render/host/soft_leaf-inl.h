@@ -171,14 +171,15 @@ HWY_INLINE Mask castSoftLeaf(const SoftLeaf& soft, const LeafRays& leaf, RayGrou
     const field::RayField ray = restrictToRay(soft, part.p, part.d);
     // Where a ray begins inside the leaf, that end is no wall.
     const Lane wall(max(Lane(soft.wall), Lane(leaf.rounding)));
-    const Lane wallIn = select(s.first > Lane(leaf.tauMin), wall, Lane(0.0f));
+    const Lane wallIn = select(s.first > s.begin, wall, Lane(0.0f));
     const Crossing crossing = firstCrossing(ray, s.inside, wallIn, wall, soft.dip);
-    if (!any(crossing.hit)) return crossing.hit;
-    const Lane3 at = keepHits(group, leaf, s, part, crossing.hit, crossing.u);
+    const Mask hit = keptHits(leaf, s, crossing.hit, crossing.u);
+    if (!any(hit)) return hit;
+    const Lane3 at = keepHits(group, leaf, s, part, hit, crossing.u);
     const Lane side = sideBefore(ray, crossing.u, part.d);
-    group.side = select(crossing.hit, side, group.side);
-    group.normal = select(crossing.hit, softNormal(soft, at, group.direction, side), group.normal);
-    return crossing.hit;
+    group.side = select(hit, side, group.side);
+    group.normal = select(hit, softNormal(soft, at, group.direction, side), group.normal);
+    return hit;
 }
 
 }  // namespace vcp::HWY_NAMESPACE

@@ -24,6 +24,7 @@ public:
 
     void run() {
         hits_.any = false;
+        hits_.onCap.reset();
         hits_.leaves.clear();
         while (!walk_.isDone() && open_ != 0) {
             const WalkEntry at = walk_.next();
@@ -61,6 +62,7 @@ private:
             outside = outside | isBelow(sides_.first, firstRow, c, half, rounding);
             outside = outside | isAbove(sides_.last, lastRow, c, half, rounding);
             outside = outside | (dot(c, spread(ahead)) < -mulAdd(Lane(half), Lane(1.7321f), rounding));
+            for (const SectionCut& plane : rays_.sections) outside = outside | isCutAway(plane, c, half, rounding);
             met |= bitsOf(hn::Not(outside)) << i;
         }
         return met;
@@ -74,6 +76,11 @@ private:
     }
     static Mask isAbove(const TilePlanes& p, int k, Lane3 c, float half, Lane rounding) {
         return heightOver(p, k, c) > Lane(half * p.sum[k]) + rounding;
+    }
+
+    static Mask isCutAway(const SectionCut& plane, Lane3 c, float half, Lane rounding) {
+        const glm::vec3 n(plane), size = glm::abs(n);
+        return dot(c, spread(n)) - Lane(plane.w) < -(Lane(half * (size.x + size.y + size.z)) + rounding);
     }
 
     /// Returns the groups with rays that may meet a box; arguments as those of childrenMet.
@@ -103,8 +110,9 @@ private:
         const glm::dvec3 lowest = glm::dvec3(at.corner) * kSubcell - rays_.origin;
         const uint32_t groups = open_ & groupsMet(glm::vec3(lowest + 0.5 * edge), float(0.5 * edge));
         if (groups == 0) return;
+        LeafRays leaf = leafRays(rays_, lowest, edge);
+        if (!rays_.sections.empty() && !cutLeaf(rays_, lowest, edge, leaf)) return;
         if (!haveRays_) makeGroups();
-        const LeafRays leaf = leafRays(rays_, lowest, edge);
         if (nodeType(at.word) == kNodeHard) return castHard(at, leaf, groups);
         const PageView& view = *scene_.page(at.page).view;
         if (nodeType(at.word) == kNodeSlab) {

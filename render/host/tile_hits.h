@@ -1,6 +1,7 @@
 // What the rays of one tile hit.
 #pragma once
 
+#include <bitset>
 #include <cstdint>
 #include <vector>
 
@@ -36,6 +37,7 @@ struct TileHits {
     /// The surface's normal: of any length, on the side that the ray comes from, or near a silhouette leaning away a
     /// bit.
     alignas(32) float normalX[kTilePixels], normalY[kTilePixels], normalZ[kTilePixels];
+    std::bitset<kTilePixels> onCap;  ///< where the cap of a section is hit (section_caps.h)
     std::vector<HitLeaf> leaves;
 };
 

@@ -12,7 +12,17 @@ namespace {
 /// How far beyond its outermost rays a group of rays reaches, in pixels. It bridges rounding.
 constexpr double kMargin = 1.0 / 64;
 
+/// A section plane so near to a leaf's wall, in leaf edges, is in the wall: rays begin in the leaf on the side that is
+/// kept.
+constexpr double kInWall = 1e-6;
+
 double sumOf(glm::dvec3 v) { return std::abs(v.x) + std::abs(v.y) + std::abs(v.z); }
+
+/// Returns how far a cube's corner that is lowest over a plane lies over it, or below.
+double lowestIn(const SectionCut& plane, glm::dvec3 lowest, double edge) {
+    const glm::dvec3 n(plane);
+    return glm::dot(n, lowest) + edge * (glm::min(n.x, 0.0) + glm::min(n.y, 0.0) + glm::min(n.z, 0.0)) - plane.w;
+}
 
 /// The plane through the rays `at` steps along `step` from the middle. `across`: the other step.
 void setPlane(TilePlanes& planes, int index, const TileRays& rays, double at, bool alongX) {
@@ -32,15 +42,16 @@ void setPlane(TilePlanes& planes, int index, const TileRays& rays, double at, bo
 
 TileRays tileRays(const PictureRays& rays, const HostGrid& grid, glm::ivec2 corner) {
     const double x = corner.x + 0.5 * kTileWidth, y = corner.y + 0.5 * kTileHeight;
-    const glm::dvec3 direction = rays.directionAt(x, y);
+    const glm::dvec3 origin = rays.originAt(x, y), direction = rays.directionAt(x, y);
     const double perCell = 1 / grid.cell, perLength = 1 / glm::length(direction);
-    return {(rays.originAt(x, y) - grid.origin) * perCell,
+    return {(origin - grid.origin) * perCell,
             rays.originPerX * perCell,
             rays.originPerY * perCell,
             direction * perLength,
             rays.directionPerX * perLength,
             rays.directionPerY * perLength,
-            rays.directionPerX == glm::dvec3(0) && rays.directionPerY == glm::dvec3(0)};
+            rays.directionPerX == glm::dvec3(0) && rays.directionPerY == glm::dvec3(0),
+            inCells(rays.sections, origin, grid.cell)};
 }
 
 TileSides tileSides(const TileRays& rays, int groupHeight) {
@@ -73,7 +84,19 @@ LeafRays leafRays(const TileRays& rays, glm::dvec3 lowest, double edge) {
     const float reach =
         1 + largest(leaf.start) - kFirstColumn * largest(leaf.startPerX) - kFirstRow * largest(leaf.startPerY);
     leaf.rounding = 0x1p-22f * reach;
+    leaf.cutCount = 0;
     return leaf;
+}
+
+bool cutLeaf(const TileRays& rays, glm::dvec3 lowest, double edge, LeafRays& leaf) {
+    for (const SectionCut& plane : rays.sections) {
+        const glm::dvec3 normal(plane);
+        const double height = lowestIn(plane, lowest, edge);
+        if (height + edge * sumOf(normal) <= kInWall * edge) return false;
+        if (height < kInWall * edge)
+            leaf.cuts[leaf.cutCount++] = glm::vec4(normal, (plane.w - glm::dot(normal, lowest)) / edge);
+    }
+    return true;
 }
 
 }  // namespace vcp

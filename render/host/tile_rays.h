@@ -7,6 +7,7 @@
 #include "render/host/host_scene.h"
 #include "render/host/picture_rays.h"
 #include "render/host/tile_hits.h"
+#include "render/shared/frame.h"
 
 namespace vcp {
 
@@ -16,6 +17,7 @@ struct TileRays {
     glm::dvec3 origin, originPerX, originPerY;  ///< finest cells, from the root's lowest corner
     glm::dvec3 direction, directionPerX, directionPerY;
     bool isParallel;
+    std::vector<SectionCut> sections;  ///< finest cells, relative to the middle's origin
 };
 TileRays tileRays(const PictureRays& rays, const HostGrid& grid, glm::ivec2 corner);
 
@@ -48,8 +50,13 @@ struct LeafRays {
     float tauMin;    ///< the rays begin here: -distance, in leaf edges
     float edge;      ///< finest cells
     float rounding;  ///< of points on the rays within the leaf, leaf edges
+    int cutCount;    ///< number of section planes that cut the leaf's box
+    glm::vec4 cuts[frame::kMaxSections];  ///< in leaf space: what has dot(xyz, p) >= w is kept
 };
 /// `lowest`: the leaf's lowest corner relative to the tile's origin, and `edge`: its edge, both in finest cells.
 LeafRays leafRays(const TileRays& rays, glm::dvec3 lowest, double edge);
+
+/// Notes which section planes cut such a leaf; leafRays notes none. Returns false where they leave nothing of it.
+bool cutLeaf(const TileRays& rays, glm::dvec3 lowest, double edge, LeafRays& leaf);
 
 }  // namespace vcp

@@ -60,15 +60,19 @@ struct LinearSums {
     }
 };
 
-/// Up to kLanes triangles of a hard leaf. `volume[k]`: of the ray with the edge opposite vertex k; all three have the
-/// sign of `along` inside. height / along: distance to the plane.
-struct Triangles {
-    static constexpr uint32_t kNoNumber = ~0u;
-
+/// The vertices of up to kLanes triangles of a hard leaf.
+struct TriangleVertices {
     int count;
     alignas(32) uint32_t corners[3][8];           // vertices a, b and c in the page
-    uint32_t number[8];                           // of the triangle's HitLeaf, once a ray has hit
     alignas(32) float x[3][8], y[3][8], z[3][8];  // vertices, as in HardLeaf
+};
+
+/// Up to kLanes triangles of a hard leaf. `volume[k]`: of the ray with the edge opposite vertex k; all three have the
+/// sign of `along` inside. height / along: distance to the plane.
+struct Triangles : TriangleVertices {
+    static constexpr uint32_t kNoNumber = ~0u;
+
+    uint32_t number[8];  // of the triangle's HitLeaf, once a ray has hit
     LinearSums volume[3], along, height;
     alignas(32) float slack[3][8];   // a ray misses where a volume is below that, which is less than 0
     alignas(32) float lowest[3][8];  // all rays of a group miss where their middle's volume is below that
@@ -92,7 +96,7 @@ HWY_INLINE Lane3 decodeVertices(LaneWords lo, LaneWords hi, glm::ivec3 corner) {
 }
 
 /// Takes the next triangles of a leaf. Returns false where there are none left.
-HWY_INLINE bool nextTriangles(StripWalk& walk, Triangles& t) {
+HWY_INLINE bool nextTriangles(StripWalk& walk, TriangleVertices& t) {
     t.count = 0;
     for (Index3 corners{}; t.count < kLanes && walk.next(); ++t.count) {
         corners = walk.triangle();
@@ -103,10 +107,10 @@ HWY_INLINE bool nextTriangles(StripWalk& walk, Triangles& t) {
     return true;
 }
 
-HWY_INLINE Lane3 vertexOf(const Triangles& t, int k) { return {load(t.x[k]), load(t.y[k]), load(t.z[k])}; }
+HWY_INLINE Lane3 vertexOf(const TriangleVertices& t, int k) { return {load(t.x[k]), load(t.y[k]), load(t.z[k])}; }
 
 /// Reads the vertices of triangles whose corners are known. `corner`: as of HardLeaf.
-HWY_INLINE void loadVertices(const PageView& view, glm::ivec3 corner, Triangles& t) {
+HWY_INLINE void loadVertices(const PageView& view, glm::ivec3 corner, TriangleVertices& t) {
     for (int k = 0; k < 3; ++k) {
         const LaneWords twice = hn::ShiftLeft<1>(hn::Load(Words(), t.corners[k]));
         const uint32_t* words = &view.vertices.data()->x;

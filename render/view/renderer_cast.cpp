@@ -92,6 +92,7 @@ std::optional<PixelHit> Renderer::View::castHit(const Frame& frame, PicturePixel
     if (picture.hits[at].dataset == HostHit().dataset) return {};
     PixelHit hit = pixelHit(frame.request, pixel, double(picture.depth[at]), picture.normals[at]);
     hit.dataset = picture.hits[at].dataset;
+    hit.onCap = picture.hits[at].onCap != 0;
     return hit;
 }
 

@@ -493,6 +493,33 @@ static void sharing(void) {
     OK(vcp_context_destroy(context));
 }
 
+/* Where no device is named, the processor casts the rays of a software device; where that is named, its shaders do. */
+static void device_rays(void) {
+    build_ball(0);
+    vcp_device_info device = VCP_INIT(vcp_device_info);
+    static float depth[2][PIXELS];
+    static uint8_t rgba[4 * PIXELS];
+    for (int named = 0; named < 2; ++named) {
+        vcp_context_options options = VCP_INIT(vcp_context_options);
+        if (named) options.device = device.name;
+        vcp_context* context = make_context(&options);
+        vcp_view* view = make_view(context);
+        if (!named) OK(vcp_context_device(context, &device));
+        OK(vcp_context_open(context, tree, NULL));
+        OK(vcp_view_settle(view, 60));
+        vcp_stats stats = VCP_INIT(vcp_stats);
+        OK(vcp_view_stats(view, &stats));
+        CHECK(stats.processor_rays == (device.software && !named));
+        read_frame(view, rgba, depth[named]);
+        OK(vcp_view_destroy(view));
+        OK(vcp_context_destroy(context));
+    }
+    int apart = 0;
+    for (int i = 0; i < PIXELS; ++i)
+        apart += isinf(depth[0][i]) ? !isinf(depth[1][i]) : !(fabsf(depth[0][i] - depth[1][i]) < 1e-4f);
+    CHECK(apart <= 2);
+}
+
 static void write_scene(const char* text) {
     FILE* file = fopen(scene, "w");
     CHECK(file && fputs(text, file) >= 0 && fclose(file) == 0);
@@ -911,19 +938,10 @@ int main(int argc, char** argv) {
     static const struct {
         const char* name;
         void (*run)(void);
-    } cases[] = {{"picture", picture},
-                 {"input", input},
-                 {"callbacks", callbacks},
-                 {"progress", progress},
-                 {"wrong_calls", wrong_calls},
-                 {"sharing", sharing},
-                 {"placed", placed},
-                 {"scenes", scenes},
-                 {"looks", looks},
-                 {"opening", opening},
-                 {"layers", layers},
-                 {"cycles", cycles},
-                 {"threads", threads}};
+    } cases[] = {{"picture", picture},         {"input", input},     {"callbacks", callbacks}, {"progress", progress},
+                 {"wrong_calls", wrong_calls}, {"sharing", sharing}, {"rays", device_rays},    {"placed", placed},
+                 {"scenes", scenes},           {"looks", looks},     {"opening", opening},     {"layers", layers},
+                 {"cycles", cycles},           {"threads", threads}};
     if (argc != 3) return 2;
     snprintf(ply, sizeof(ply), "%s/ball-%s.ply", argv[2], argv[1]);
     snprintf(tree, sizeof(tree), "%s/ball-%s.vcp", argv[2], argv[1]);

@@ -76,6 +76,11 @@ Result<void> checkOptions(const RenderCommand& command) {
     const std::filesystem::path output = command.output, depth = command.depth, normals = command.normals;
     if (depth == output || normals == output || (!command.depth.empty() && depth == normals))
         return usage("picture, --depth and --normals must be different files");
+    if (command.isVideo() && !command.isSequence())
+        return usage("a video needs --turntable or --path, which say what it shows");
+    if (command.isVideo() && command.transparent) return usage("a video has no transparency; leave out --transparent");
+    if (command.isVideo() && !hasVideoEncoder())
+        return usage("a video needs the program ffmpeg, which is not installed; name a .png for numbered pictures");
     if (command.legend && !isFalseColour(command.render.shading.mode))
         return usage("--legend goes with --shading steps, cells, fetches, level or error");
     if (command.methods.empty()) return {};
@@ -101,8 +106,7 @@ Result<void> checkOutputs(const RenderCommand& command, const OutputRules& rules
     for (const std::string& name : {command.output, command.depth, command.normals}) {
         if (name.empty()) continue;
         const OutputKind kind = outputKindOf(name).value_or(OutputKind::Png);
-        for (size_t i = 1; i <= pictures; ++i)
-            VCP_TRY(checkOutput(command.isSequence() ? numbered(name, i) : std::filesystem::path(name), kind, rules));
+        for (size_t i = 1; i <= pictures; ++i) VCP_TRY(checkOutput(command.fileOf(name, i), kind, rules));
     }
     return {};
 }
@@ -251,12 +255,13 @@ Command addRender(CLI::App& vcp) {
     app->add_option(
            "-o,--output", command->output,
            "The PNG file to write, with all inputs in it, or - for standard output; a folder, or a name with {} "
-           "like \"pictures/{}-front.png\": a picture of each input, with its name")
+           "like \"pictures/{}-front.png\": a picture of each input, with its name; OUT.mp4 or OUT.webm: a video of "
+           "--turntable or --path, where ffmpeg is installed")
         ->type_name("OUT.png")
         ->required()
         ->check([](const std::string& name) {
             const bool isFolder = isForEachInput(name) && name.find("{}") == std::string::npos;
-            return isFolder ? std::string() : extensionProblem(name, ".png", true);
+            return isFolder || isVideoPath(name) ? std::string() : extensionProblem(name, ".png", true);
         });
     addOverwriteOption(*app, command->overwrite);
     addSize(*app, command->size, "1920x1200", "Width and height in pixels")->default_str(sizeText(command->size));
@@ -282,13 +287,19 @@ Command addRender(CLI::App& vcp) {
         ->check(CLI::Range(0, meso::kMostSubdivisions));
     beginGroup(*app, help_group::kPictures);
     CLI::Option* turntable = app->add_option("--turntable", command->turntable,
-                                             "So many pictures once around the up axis: OUT-0001.png and so on")
+                                             "So many pictures once around the up axis: OUT-0001.png and so on, or a "
+                                             "video")
                                  ->type_name("N")
                                  ->check(CLI::Range(1, 9999));
     app->add_option("--path", command->path,
-                    "Pictures along a smooth path through the cameras of a JSON array: OUT-0001.png and so on")
+                    "Pictures along a smooth path through the cameras of a JSON array: OUT-0001.png and so on, or a "
+                    "video")
         ->type_name("FILE")
         ->excludes(turntable);
+    app->add_option("--fps", command->framesPerSecond, "Pictures of a video that are shown in a second")
+        ->type_name("N")
+        ->check(CLI::Range(1, 240))
+        ->capture_default_str();
     app->add_option(
            "--frames", command->frames,
            "Pictures along --path [120]; of one picture: draw it so often again, and report the median time [0; 5 with "

@@ -77,7 +77,7 @@ StressOptions optionsFor(const StressCommand& command, const OpenDataset& open) 
 Result<int> runMotion(const StressCommand& command, const OpenDataset& open, const RendererOptions& renderer) {
     MotionOptions options;
     options.viewer.renderer = renderer;
-    options.viewer.renderer.hostRays = renderer.device.empty();  // as in the window
+    options.viewer.renderer.hostRays = leavesRaysToHost(renderer.device);  // as in the window
     options.viewer.errorPixels = command.errorPixels;
     options.size = command.size;
     options.seconds = command.motionSeconds;

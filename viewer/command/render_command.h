@@ -37,6 +37,7 @@ struct RenderCommand {
     bool legend = false, scaleBar = false;
     int turntable = 0;
     std::string path;
+    int framesPerSecond = 30;
     std::vector<std::string> methods;  // empty: those of the scene
     std::optional<int> subdivide;
     bool validation = false;
@@ -47,6 +48,11 @@ struct RenderCommand {
     /// Figures are wanted with --json, and the first frame, which compiles, would not be one.
     [[nodiscard]] int framesToTime() const { return frames > 0 ? frames : report.json ? 5 : 0; }
     [[nodiscard]] bool isSequence() const { return turntable > 0 || !path.empty(); }
+    [[nodiscard]] bool isVideo() const { return isVideoPath(output); }
+    /// Returns the name of a picture's file, for one of the command's outputs.
+    [[nodiscard]] std::filesystem::path fileOf(const std::string& name, size_t picture) const {
+        return isSequence() && !isVideoPath(name) ? numbered(name, picture) : std::filesystem::path(name);
+    }
     [[nodiscard]] bool isTiled(const FrameRequest& request) const {
         return tile > 0 || isSequence() || uint64_t{request.width} * request.height > kMostPixelsAtOnce;
     }

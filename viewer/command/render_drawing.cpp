@@ -223,6 +223,7 @@ Result<Json> makeTiled(PictureRenderer& renderer, const FrameRequest& request, c
                                         .cameras = std::move(current),
                                         .files = {command.output, command.depth, command.normals},
                                         .isNumbered = command.isSequence(),
+                                        .framesPerSecond = command.framesPerSecond,
                                         .tile = command.tile > 0 ? command.tile : kUsualTile,
                                         .samples = command.samples,
                                         .rules = rules,
@@ -238,9 +239,9 @@ Result<Json> makeTiled(PictureRenderer& renderer, const FrameRequest& request, c
     const TiledPictureStats& total = sequence.stats();
     if (command.report.json)
         return toJson(total, cameras.size(), samplesOf(request, command.samples), renderer.device(), request);
-    const std::string name = command.isSequence() ? fmt::format("{} to {}", numbered(command.output, 1).string(),
-                                                                numbered(command.output, cameras.size()).string())
-                                                  : command.output;
+    const std::string first = command.fileOf(command.output, 1).string();
+    const std::string last = command.fileOf(command.output, cameras.size()).string();
+    const std::string name = first == last ? first : fmt::format("{} to {}", first, last);
     VCP_TRY(printLineAbout(command.output, fmt::format("{}: {}, {} tiles in {}", name, sizeText(command.size),
                                                        total.tiles, formatSeconds(1e-3 * total.ms))));
     return Json();

@@ -29,7 +29,12 @@ Result<bool> PictureSequence::step() {
 Result<void> PictureSequence::begin() {
     FrameRequest request = o_.request;
     request.camera = o_.cameras[finished_];
-    VCP_TRY_ASSIGN(png_, PngRows::create(fileOf(o_.files.picture), request.width, request.height, o_.rules));
+    if (!isVideoPath(o_.files.picture)) {
+        VCP_TRY_ASSIGN(png_, PngRows::create(fileOf(o_.files.picture), request.width, request.height, o_.rules));
+    } else if (!video_) {
+        const VideoFormat format{request.width, request.height, o_.framesPerSecond};
+        VCP_TRY_ASSIGN(video_, VideoFile::create(o_.files.picture, format, o_.rules));
+    }
     const TiledPictureOptions options{.tile = o_.tile,
                                       .samples = o_.samples,
                                       .depth = !o_.files.depth.empty(),
@@ -47,14 +52,15 @@ Result<void> PictureSequence::take(PictureBand& band) {
     rows_ += band.picture.height;
     depth_.insert(depth_.end(), band.depth.begin(), band.depth.end());
     normals_.insert(normals_.end(), band.normals.begin(), band.normals.end());
-    return png_->add(band.picture.rgba);
+    return video_ ? video_->add(band.picture.rgba) : png_->add(band.picture.rgba);
 }
 
 Result<void> PictureSequence::finish() {
     const auto [width, height] = std::pair(o_.request.width, o_.request.height);
     if (!o_.files.depth.empty()) VCP_TRY(writeDepth(depth_, width, height, fileOf(o_.files.depth), o_.rules));
     if (!o_.files.normals.empty()) VCP_TRY(writeNormals(normals_, width, height, fileOf(o_.files.normals), o_.rules));
-    VCP_TRY(png_->finish());
+    if (png_) VCP_TRY(png_->finish());
+    if (video_ && finished_ + 1 == o_.cameras.size()) VCP_TRY(video_->finish());
     const TiledPictureStats& drawn = picture_->stats();
     stats_.tiles += drawn.tiles;
     stats_.rays += drawn.rays;

@@ -13,11 +13,12 @@
 #include "render/picture_renderer.h"
 #include "viewer/picture/png_rows.h"
 #include "viewer/picture/tiled_picture.h"
+#include "viewer/picture/video_file.h"
 
 namespace vcp {
 
 struct PictureFiles {
-    std::filesystem::path picture;         ///< .png
+    std::filesystem::path picture;         ///< .png; or .mp4 or .webm, a video of all pictures (video_file.h)
     std::filesystem::path depth, normals;  ///< .pfm or .png (image_files.h); empty: not written
 };
 
@@ -25,10 +26,11 @@ struct PictureSequenceOptions {
     FrameRequest request;         ///< request of each picture, without the camera
     std::vector<Camera> cameras;  ///< one for each picture; at least one
     PictureFiles files;
-    bool isNumbered = false;  ///< turn.png stands for turn-0001.png and so on
-    uint32_t tile = 2048;     ///< edge in pixels, at least 16
-    uint32_t samples = 1;     ///< of a pixel
-    OutputRules rules = {};   ///< what the files may replace
+    bool isNumbered = false;  ///< turn.png stands for turn-0001.png and so on; a video has no number
+    int framesPerSecond = 30;
+    uint32_t tile = 2048;    ///< edge in pixels, at least 16
+    uint32_t samples = 1;    ///< of a pixel
+    OutputRules rules = {};  ///< what the files may replace
     /// Called with rows of each picture before they are written, to paint over them: the picture's number in `cameras`,
     /// its rows, over its whole width, and the number of the first. May be empty.
     std::function<void(size_t picture, Picture& rows, uint32_t firstRow)> paintOver = {};
@@ -50,8 +52,8 @@ public:
     PictureSequence& operator=(const PictureSequence&) = delete;
 
     /// Draws the next tile or a sample of it where all that it wants is there; never waits for reads. Returns true when
-    /// the last file is written. Errors: those of TiledPicture, PngRows, writeDepth and writeNormals; after one, it
-    /// must not be called again.
+    /// the last file is written. Errors: those of TiledPicture, PngRows, VideoFile, writeDepth and writeNormals; after
+    /// one, it must not be called again.
     Result<bool> step();
     /// Whether pages were missing in the last step().
     [[nodiscard]] bool isWaiting() const { return picture_ && picture_->isWaiting(); }
@@ -77,8 +79,9 @@ private:
     TiledPictureStats stats_;
     // The parts of the picture in the making.
     std::unique_ptr<TiledPicture> picture_;
-    std::unique_ptr<PngRows> png_;
-    uint32_t rows_ = 0;  // that are written
+    std::unique_ptr<PngRows> png_;      // null where a video is made
+    std::unique_ptr<VideoFile> video_;  // of all pictures
+    uint32_t rows_ = 0;                 // that are written
     std::vector<float> depth_;
     std::vector<glm::vec3> normals_;
 };

@@ -1,5 +1,6 @@
 #include "viewer/picture/video_file.h"
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <csignal>
@@ -145,8 +146,8 @@ Result<void> VideoFile::Encoder::end() {
     while (ended < 0 && errno == EINTR);
     process = 0;
     if (ended > 0 && WIFEXITED(status) && WEXITSTATUS(status) == 0) return {};
-    const std::string said = lastLineSaid();
-    return error(ErrorCode::Io, "ffmpeg failed" + (said.empty() ? std::string() : ": " + said));
+    const std::string line = lastLineSaid();
+    return error(ErrorCode::Io, "ffmpeg failed" + (line.empty() ? std::string() : ": " + line));
 }
 
 VideoFile::VideoFile(std::unique_ptr<Encoder> encoder) : encoder_(std::move(encoder)) {}

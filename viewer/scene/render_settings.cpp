@@ -28,7 +28,7 @@ std::optional<CameraChoice> parseCamera(std::string_view text) {
 RendererOptions RenderSettings::rendererOptions() const {
     RendererOptions options;
     options.device = device;
-    options.hostRays = device.empty();
+    options.hostRays = leavesRaysToHost(device);
     options.budgetBytes = budgetBytes;
     options.ramBytes = ramBytes;
     // Colour pages are neither read nor kept when nothing would show them.

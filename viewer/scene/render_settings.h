@@ -26,6 +26,10 @@ using CameraChoice = std::variant<View, ViewAngles, std::filesystem::path>;
 /// a file. Returns nothing for numbers that are no view.
 std::optional<CameraChoice> parseCamera(std::string_view text);
 
+/// Returns whether a software device leaves its rays to the processor (RendererOptions::hostRays): where no device was
+/// named. `device`: the name; empty: none.
+[[nodiscard]] inline bool leavesRaysToHost(std::string_view device) { return device.empty(); }
+
 struct RenderSettings {
     std::string device;
     uint64_t budgetBytes = RendererOptions().budgetBytes;

@@ -1,4 +1,5 @@
 #include "streaming/web_address.h"
+#include "viewer/scene/render_settings.h"
 #include "viewer/widget/handles.h"
 #include "viewer/widget/window_surface.h"
 
@@ -19,6 +20,7 @@ Result<std::unique_ptr<vcp_context>> createContext(const vcp_context_options& gi
     VCP_TRY_ASSIGN(made->callbacks, taken(given.callbacks));
     RendererOptions options;
     options.device = textOf(given.device);
+    options.hostRays = !given.host_device && leavesRaysToHost(options.device);
     if (given.gpu_bytes > 0) options.budgetBytes = given.gpu_bytes;
     if (given.ram_bytes > 0) options.ramBytes = given.ram_bytes;
     if (given.loader_threads > 64) return wrong("more than 64 loader threads");

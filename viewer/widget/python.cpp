@@ -134,7 +134,7 @@ py::dict toDict(const vcp_stats& s) {
                     "hit_pixels"_a = s.hit_pixels, "samples"_a = s.samples, "detail"_a = s.detail,
                     "resident_bytes"_a = s.resident_bytes, "pool_bytes"_a = s.pool_bytes, "bytes_read"_a = s.bytes_read,
                     "pages_resident"_a = s.pages_resident, "pages_drawn"_a = s.pages_drawn,
-                    "device_losses"_a = s.device_losses);
+                    "device_losses"_a = s.device_losses, "processor_rays"_a = s.processor_rays != 0);
 }
 
 py::object pickOf(View& view, double x, double y) {

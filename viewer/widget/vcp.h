@@ -105,8 +105,10 @@ typedef struct vcp_host_device {
 
 typedef struct vcp_context_options {
     uint32_t struct_size;
-    uint32_t windows;                   /* 1: views may have windows */
-    const char* device;                 /* index, or a part of the name; NULL: the best one */
+    uint32_t windows; /* 1: views may have windows */
+    /* Index, or a part of the name; NULL: the best one, and where that is a software device, the processor casts rays
+     * itself and leaves to the device what it does not draw. */
+    const char* device;
     const vcp_host_device* host_device; /* NULL: the context makes a device of its own */
     uint64_t gpu_bytes;                 /* budget of the pages on the device, never exceeded; 0: 512 MiB */
     uint64_t ram_bytes;      /* budget of pages being read or kept to be read again, never exceeded; 0: 256 MiB */
@@ -434,8 +436,10 @@ typedef struct vcp_stats {
     uint64_t read_failures; /* reads that failed and were tried again */
     uint32_t pages_resident, pages_drawn, pages_wanted, pages_missing;
     uint32_t coarsest_level, finest_level;
-    uint32_t samples; /* rays a pixel, so far, of the last picture */
-    uint32_t detail;  /* limited by 0: loading, 1: nothing, 2: the finest level, 3: the budget */
+    uint32_t samples;        /* rays a pixel, so far, of the last picture */
+    uint32_t detail;         /* limited by 0: loading, 1: nothing, 2: the finest level, 3: the budget */
+    uint32_t processor_rays; /* 1: the processor cast the rays of the last picture itself, and no shader ran */
+    uint32_t reserved;
 } vcp_stats;
 
 VCP_API vcp_status vcp_view_stats(vcp_view* view, vcp_stats* stats);

@@ -326,6 +326,7 @@ vcp_stats statsOf(const Viewer& viewer) {
     stats.frames = viewer.framesDrawn();
     stats.samples = status.samples;
     stats.detail = uint32_t(status.detail);
+    stats.processor_rays = status.frame.onHost ? 1 : 0;
     stats.frame_ms = status.frame.msFrame;
     stats.error_pixels = update.errorPixels;
     stats.rays = status.frame.rays;

@@ -131,6 +131,7 @@ private:
     PictureChoice picture_;
     std::optional<bool> annotatesPictures_;  // none: where something is measured
     int sequencePictures_ = 120;
+    const bool hasEncoder_ = hasVideoEncoder();
 };
 
 }  // namespace vcp

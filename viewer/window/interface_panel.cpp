@@ -197,6 +197,14 @@ void Interface::layOutCut() {
         viewer.setSections({{normal, glm::dot(normal, viewer.bounds().centre())}});
     }
     if (textButton(*look_, icon::kFlip, "Keep the other side")) viewer.setSections({{-plane.normal, -plane.offset}});
+    ImGui::BeginDisabled(session_->saving().has_value());
+    const float half = (ImGui::GetContentRegionAvail().x - units(8)) / 2;
+    if (textButton(*look_, icon::kExport, "SVG", {"Write the cut's lines as a drawing, cut-1.svg", ""}, half))
+        session_->saveCut(".svg");
+    ImGui::SameLine();
+    if (textButton(*look_, icon::kExport, "DXF", {"Write the cut's lines for CAD, cut-1.dxf", ""}, half))
+        session_->saveCut(".dxf");
+    ImGui::EndDisabled();
     ImGui::PushStyleColor(ImGuiCol_Text, look_->palette.dim);
     wrapped("Drag the arrow to move the plane, its ring to turn it; Shift + wheel moves it too.");
     ImGui::PopStyleColor();
@@ -261,8 +269,13 @@ void Interface::layOutSave() {
     ImGui::SameLine();
     if (textButton(*look_, icon::kPath, "Path", {"Smoothly through the bookmarks", "Ctrl+B"}, half)) savePath();
     ImGui::EndDisabled();
-    valueRow(*look_, "As a film",
-             fmt::format("{:.1f} s at {} a second", sequencePictures_ / kPicturesPerSecond, kPicturesPerSecond));
+    ImGui::BeginDisabled(!hasEncoder_);
+    switchRow(*look_, fmt::format("As a video of {:.1f} s", sequencePictures_ / kPicturesPerSecond).c_str(),
+              picture_.video,
+              {hasEncoder_ ? "turntable-1.mp4 in place of a folder of pictures, without depth"
+                           : "Needs the program ffmpeg, which is not installed",
+               ""});
+    ImGui::EndDisabled();
 }
 
 void Interface::layOutLimits() {

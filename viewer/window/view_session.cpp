@@ -150,7 +150,11 @@ Result<void> ViewSession::show(const OpenedScene& open, const std::vector<std::s
     endPick();
     measurement_.clear();
     finest_ = std::make_shared<ScenePick>();
-    for (const OpenedScene::Part& part : open.parts) finest_->add(part.open.reader, *part.open.dataset, part.placement);
+    scans_.clear();
+    for (const OpenedScene::Part& part : open.parts) {
+        finest_->add(part.open.reader, *part.open.dataset, part.placement);
+        scans_.push_back({.reader = part.open.reader, .placement = part.placement, .plane = {}, .unit = {}});
+    }
     VCP_TRY(viewer_->open(open.placed(), open.surfaces, camera, nameOf(inputs)));
     if (!open.surfaces.warnings.empty()) note(open.surfaces.warnings.front());
     subject_ = open.legendSubject();
@@ -186,6 +190,7 @@ Result<NextStep> ViewSession::update(double now) {
     takePreview(now);
     takePicked();
     goOnSaving();
+    takeCut();
     noteChanges();
     // What is saved or built has the processors and the device for itself.
     viewer_->setSamples(saving_ || opening_ ? 1 : options_.samples);
@@ -199,6 +204,7 @@ Result<NextStep> ViewSession::update(double now) {
     }
     if (opening_) next->waitSeconds = std::min(next->waitSeconds, kOpeningPollSeconds);
     if (saving_) next->waitSeconds = saving_->pictures->isWaiting() ? std::min(next->waitSeconds, kPickPollSeconds) : 0;
+    if (cut_) next->waitSeconds = std::min(next->waitSeconds, kOpeningPollSeconds);
     if (pick_.valid()) next->waitSeconds = std::min(next->waitSeconds, kPickPollSeconds);
     return next;
 }
@@ -318,7 +324,7 @@ void ViewSession::exportMeasurement() {
 }
 
 void ViewSession::savePicture(const PictureChoice& choice) {
-    if (saving_ || !viewer_->isOpen()) return;
+    if (saving() || !viewer_->isOpen()) return;
     const auto filesOf = [&](int number) {
         PictureFiles files{fmt::format("picture-{}.png", number), {}, {}};
         if (choice.depth) files.depth = fmt::format("picture-{}-depth.pfm", number);
@@ -330,12 +336,12 @@ void ViewSession::savePicture(const PictureChoice& choice) {
 }
 
 void ViewSession::saveTurntable(const PictureChoice& choice, int pictures) {
-    if (saving_ || !viewer_->isOpen()) return;
+    if (saving() || !viewer_->isOpen()) return;
     saveSequence(choice, "turntable", turntable(viewer_->camera(), viewer_->bounds().centre(), pictures));
 }
 
 void ViewSession::savePath(const PictureChoice& choice, int pictures) {
-    if (saving_ || !viewer_->isOpen()) return;
+    if (saving() || !viewer_->isOpen()) return;
     std::vector<OrbitCamera> keys;
     if (const auto* kept = bookmarks())
         for (const auto& [number, camera] : *kept) keys.push_back(camera);
@@ -345,8 +351,11 @@ void ViewSession::savePath(const PictureChoice& choice, int pictures) {
 
 void ViewSession::saveSequence(const PictureChoice& choice, const std::string& name,
                                const std::vector<OrbitCamera>& cameras) {
-    const auto folderOf = [&](int number) { return std::filesystem::path(fmt::format("{}-{}", name, number)); };
-    const std::filesystem::path folder = folderOf(freeNumber([&](int i) { return isThere(folderOf(i)); }));
+    const auto nameOf = [&](int number) {
+        return std::filesystem::path(fmt::format("{}-{}{}", name, number, choice.video ? ".mp4" : ""));
+    };
+    const std::filesystem::path folder = nameOf(freeNumber([&](int i) { return isThere(nameOf(i)); }));
+    if (choice.video) return beginSaving(choice, folder, {folder, {}, {}}, cameras, false);
     std::error_code failed;
     if (!std::filesystem::create_directory(folder, failed))
         return say(fmt::format("{}: no such folder can be made in {}", folder.string(), workingFolder()));
@@ -356,19 +365,19 @@ void ViewSession::saveSequence(const PictureChoice& choice, const std::string& n
 }
 
 void ViewSession::beginSaving(const PictureChoice& choice, std::filesystem::path name, PictureFiles files,
-                              const std::vector<OrbitCamera>& cameras, bool isSequence) {
+                              const std::vector<OrbitCamera>& cameras, bool isFolder) {
     auto view = viewer_->renderer().addView();
     if (!view) {
         std::error_code failed;
-        if (isSequence) std::filesystem::remove(name, failed);
+        if (isFolder) std::filesystem::remove(name, failed);
         return say(view.error().line());
     }
     FrameRequest request = viewer_->pictureOf(choice.size);
-    request.shading.transparent = choice.transparent;
+    request.shading.transparent = choice.transparent && !isVideoPath(files.picture);
     PictureSequenceOptions options{.request = request,
                                    .cameras = {},
                                    .files = std::move(files),
-                                   .isNumbered = isSequence,
+                                   .isNumbered = isFolder,
                                    .tile = kSavedTile,
                                    .samples = std::min(options_.samples, kUsualSamples),
                                    .problem = [this](const Error& problem) { say(problem.line()); }};
@@ -379,10 +388,38 @@ void ViewSession::beginSaving(const PictureChoice& choice, std::filesystem::path
     }
     if (choice.annotated) options.paintOver = annotationPainter(annotations(), std::move(views), isDark(user_.theme));
     auto pictures = std::make_unique<PictureSequence>(**view, std::move(options));
-    saving_ = Saving{std::move(name), *std::move(view), std::move(pictures), isSequence};
+    saving_ = Saving{std::move(name), *std::move(view), std::move(pictures), isFolder};
+}
+
+void ViewSession::saveCut(const std::string& extension) {
+    if (saving()) return;
+    if (viewer_->sections().empty()) return note("cut it open first");
+    std::vector<size_t> shown;
+    const std::vector<uint32_t>& hidden = viewer_->hidden();
+    for (size_t i = 0; i < scans_.size(); ++i)
+        if (std::find(hidden.begin(), hidden.end(), uint32_t(i)) == hidden.end()) shown.push_back(i);
+    if (shown.size() != 1) return note("a cut is drawn of one scan: hide the others");
+    const auto nameOf = [&](int number) { return std::filesystem::path(fmt::format("cut-{}{}", number, extension)); };
+    CutDrawing::Subject subject = scans_[shown.front()];
+    subject.plane = viewer_->sections().front();
+    // A scan that is placed larger or smaller has units of its own.
+    if (subject.placement.scale == 1) subject.unit = unit();
+    cut_ =
+        std::make_unique<CutDrawing>(std::move(subject), nameOf(freeNumber([&](int i) { return isThere(nameOf(i)); })));
+}
+
+void ViewSession::takeCut() {
+    if (!cut_ || !cut_->isDone()) return;
+    const auto figures = cut_->take();
+    const std::string name = cut_->output().string();
+    cut_.reset();
+    if (!figures) return say(figures.error().line());
+    note(fmt::format("written: {} in {}: {} lines, {} long", name, workingFolder(), figures->lines,
+                     lengthText(figures->length, unit())));
 }
 
 std::optional<ViewSession::SavingProgress> ViewSession::saving() const {
+    if (cut_) return SavingProgress{cut_->output().string(), cut_->fraction(), 0, 1};
     if (!saving_) return std::nullopt;
     const PictureSequence& pictures = *saving_->pictures;
     return SavingProgress{saving_->name.string(), pictures.fraction(), pictures.finished(), pictures.pictures()};
@@ -393,16 +430,20 @@ std::string ViewSession::endSaving() {
     Saving saving = *std::exchange(saving_, std::nullopt);
     const auto [finished, pictures] = std::pair(saving.pictures->finished(), saving.pictures->pictures());
     saving.pictures.reset();  // a half-written file goes with it
-    std::error_code failed;
-    if (saving.isSequence && finished == 0) std::filesystem::remove(saving.name, failed);
-    if (finished == 0) return fmt::format("{}: nothing is written", saving.name.string());
+    if (saving.isFolder ? finished == 0 : finished < pictures) {
+        std::error_code failed;
+        if (saving.isFolder) std::filesystem::remove(saving.name, failed);
+        return fmt::format("{}: nothing is written", saving.name.string());
+    }
     return fmt::format("written: {}{} in {}",
-                       saving.isSequence ? fmt::format("{} of {} pictures, ", finished, pictures) : "",
+                       saving.isFolder ? fmt::format("{} of {} pictures, ", finished, pictures) : "",
                        saving.name.string(), workingFolder());
 }
 
 void ViewSession::cancelSaving() {
     if (saving_) note("cancelled; " + endSaving());
+    if (cut_) note(fmt::format("cancelled; {}: nothing is written", cut_->output().string()));
+    cut_.reset();
 }
 
 void ViewSession::goOnSaving() {

@@ -19,6 +19,7 @@
 #include "viewer/scene/render_settings.h"
 #include "viewer/scene/scene_opening.h"
 #include "viewer/viewer.h"
+#include "viewer/window/cut_drawing.h"
 #include "viewer/window/measurement.h"
 #include "viewer/window/mesh_preview.h"
 #include "viewer/window/user_settings.h"
@@ -48,6 +49,7 @@ struct PictureChoice {
     bool transparent = false;     ///< no background
     bool depth = false;           ///< also the distance along each ray, as .pfm
     bool annotated = false;       ///< with annotations()
+    bool video = false;           ///< sequences are videos, opaque and without depth
 };
 
 class ViewSession {
@@ -129,11 +131,14 @@ public:
     /// later choices do not affect it. picture-1.png, or the next free number, and picture-1-depth.pfm.
     void savePicture(const PictureChoice& choice);
     /// Saves pictures once around the middle of all, about the up axis, from the current view:
-    /// turntable-1/picture-0001.png and so on, in a new folder.
+    /// turntable-1/picture-0001.png and so on, in a new folder, or the video turntable-1.mp4.
     void saveTurntable(const PictureChoice& choice, int pictures);
     /// Saves pictures from the first bookmark to the last, through all (cameraPath): path-1/picture-0001.png and so on.
     /// Reports where there are fewer than two bookmarks.
     void savePath(const PictureChoice& choice, int pictures);
+    /// Saves the lines in which the section plane cuts what is shown, as a drawing: cut-1.svg (or .dxf, as `extension`
+    /// says) in the working folder, or the next free number. Reports where there is no plane, or not one scan alone.
+    void saveCut(const std::string& extension);
     struct SavingProgress {
         std::string name;  ///< name of the file or folder
         double fraction;   ///< 0 to 1
@@ -167,8 +172,9 @@ private:
     void endPick();
     void saveSequence(const PictureChoice& choice, const std::string& name, const std::vector<OrbitCamera>& cameras);
     void beginSaving(const PictureChoice& choice, std::filesystem::path name, PictureFiles files,
-                     const std::vector<OrbitCamera>& cameras, bool isSequence);
+                     const std::vector<OrbitCamera>& cameras, bool isFolder);
     void goOnSaving();
+    void takeCut();
     [[nodiscard]] std::string endSaving();
 
     SessionOptions options_;
@@ -193,10 +199,12 @@ private:
         std::filesystem::path name;  // name of the file, or of a sequence's folder
         std::unique_ptr<Renderer> view;
         std::unique_ptr<PictureSequence> pictures;  // drawn by that view
-        bool isSequence = false;
+        bool isFolder = false;                      // of numbered pictures
         int turnsBefore = 2;  // updates without a tile: the window lays its progress out, then shows it
     };
     std::optional<Saving> saving_;
+    std::unique_ptr<CutDrawing> cut_;
+    std::vector<CutDrawing::Subject> scans_;  // what is shown, without a plane
 };
 
 }  // namespace vcp

@@ -17,6 +17,7 @@
 
 #include "render/picture.h"
 #include "render/view/renderer.h"
+#include "tests/support/encoder_in_path.h"
 #include "tests/support/range_server.h"
 #include "tests/support/vcp_program.h"
 
@@ -739,6 +740,32 @@ TEST_F(CommandLine, PicturesInTilesAndSequences) {
         EXPECT_TRUE(fs::exists(*folder_ / name)) << name;
     EXPECT_NE(contentOf(*folder_ / "deep-0001.pfm"), contentOf(*folder_ / "deep-0002.pfm"));
     EXPECT_FALSE(fs::exists(*folder_ / "deep.pfm") || fs::exists(*folder_ / "deep-0003.pfm"));
+}
+
+TEST_F(CommandLine, ATurntableIsAVideoOfItsPictures) {
+    if (!hasDevice()) GTEST_SKIP() << "no Vulkan device";
+    const test::EncoderInPath encoder(folder_->path());
+    const auto render = [&](const std::string& name, std::vector<std::string> more) {
+        std::vector<std::string> arguments{"render", dataset().string(), "-o", (*folder_ / name).string(), "--size",
+                                           "96x64"};
+        arguments.insert(arguments.end(), more.begin(), more.end());
+        return run(arguments);
+    };
+    ASSERT_EQ(render("filmed.png", {"--turntable", "3"}).status, 0);
+    std::string wanted = "1234ftyp";
+    for (const char* name : {"filmed-0001.png", "filmed-0002.png", "filmed-0003.png"}) {
+        const Picture picture = readPng(*folder_ / name).value();
+        wanted.append(picture.rgba.begin(), picture.rgba.end());
+    }
+    const Ran filmed = render("filmed.mp4", {"--turntable", "3", "--tile", "32"});
+    ASSERT_EQ(filmed.status, 0) << filmed.err;
+    EXPECT_NE(filmed.out.find("filmed.mp4: 96x64, 18 tiles"), std::string::npos) << filmed.out;
+    EXPECT_EQ(contentOf(*folder_ / "filmed.mp4"), wanted);
+    expectFailure(render("one.mp4", {}), 2, "--turntable");
+    expectFailure(render("clear.webm", {"--turntable", "3", "--transparent"}), 2, "--transparent");
+    const test::EncoderInPath failing(folder_->path(), "echo 'no room' >&2\nexit 1\n");
+    expectFailure(render("failed.mp4", {"--turntable", "3"}), 1, "failed.mp4: ffmpeg failed: no room");
+    EXPECT_FALSE(fs::exists(*folder_ / "failed.mp4") || fs::exists(*folder_ / "failed.mp4.partial"));
 }
 
 TEST_F(CommandLine, ViewWithoutADisplayPointsToRender) {

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include "tests/support/encoder_in_path.h"
 #include "tests/support/test_folder.h"
 
 namespace vcp {
@@ -17,19 +18,6 @@ namespace fs = std::filesystem;
 
 class VideoFileTest : public testing::Test {
 protected:
-    void SetUp() override {
-        path_ = std::getenv("PATH");
-        fs::create_directory(folder_ / "bin");
-    }
-    void TearDown() override { setenv("PATH", path_.c_str(), 1); }
-
-    /// Puts a script in ffmpeg's place.
-    void replaceEncoder(const std::string& script) const {
-        const fs::path program = folder_ / "bin/ffmpeg";
-        std::ofstream(program) << "#!/bin/sh\n" << script;
-        fs::permissions(program, fs::perms::owner_all);
-        setenv("PATH", ((folder_ / "bin").string() + ":" + path_).c_str(), 1);
-    }
     [[nodiscard]] std::vector<std::string> files() const {
         std::vector<std::string> names;
         for (const auto& each : fs::directory_iterator(folder_.path()))
@@ -38,7 +26,6 @@ protected:
     }
 
     const TestFolder folder_{"vcp_video_file_test"};
-    std::string path_;
 };
 
 /// A frame of one colour.
@@ -50,7 +37,8 @@ std::vector<uint8_t> frameOf(const VideoFormat& format, glm::u8vec3 colour) {
 }
 
 TEST_F(VideoFileTest, FramesGoToTheEncoderAsTheyAre) {
-    replaceEncoder(
+    const test::EncoderInPath encoder(
+        folder_.path(),
         fmt::format("echo \"$@\" >{0}/said\n(printf '1234ftyp'; cat) >/dev/fd/3\n", folder_.path().string()));
     const VideoFormat format{.width = 300, .height = 200, .framesPerSecond = 25};
     auto video = VideoFile::create(folder_ / "a.mp4", format);
@@ -75,7 +63,8 @@ TEST_F(VideoFileTest, FramesGoToTheEncoderAsTheyAre) {
 }
 
 TEST_F(VideoFileTest, WhatTheEncoderSaysIsTheError) {
-    replaceEncoder("cat >/dev/null\necho first >&2\necho 'no such codec' >&2\nexit 3\n");
+    const test::EncoderInPath encoder(folder_.path(),
+                                      "cat >/dev/null\necho first >&2\necho 'no such codec' >&2\nexit 3\n");
     auto video = VideoFile::create(folder_ / "a.webm", {.width = 8, .height = 8});
     ASSERT_TRUE(video) << video.error().line();
     ASSERT_TRUE((*video)->add(frameOf({.width = 8, .height = 8}, {})));
@@ -88,7 +77,7 @@ TEST_F(VideoFileTest, WhatTheEncoderSaysIsTheError) {
 }
 
 TEST_F(VideoFileTest, AnEncoderThatGoesAwayIsNoSignal) {
-    replaceEncoder("echo 'disk full' >&2\nexit 1\n");
+    const test::EncoderInPath encoder(folder_.path(), "echo 'disk full' >&2\nexit 1\n");
     const VideoFormat format{.width = 1000, .height = 1000};
     auto video = VideoFile::create(folder_ / "a.mp4", format);
     ASSERT_TRUE(video) << video.error().line();
@@ -101,7 +90,7 @@ TEST_F(VideoFileTest, AnEncoderThatGoesAwayIsNoSignal) {
 }
 
 TEST_F(VideoFileTest, WhatIsNotFinishedLeavesNothing) {
-    replaceEncoder("cat >/dev/fd/3\n");
+    const test::EncoderInPath encoder(folder_.path());
     {
         std::ofstream(folder_ / "a.mp4") << "1234ftyp of before";
         auto video = VideoFile::create(folder_ / "a.mp4", {.width = 8, .height = 8});
@@ -114,13 +103,15 @@ TEST_F(VideoFileTest, WhatIsNotFinishedLeavesNothing) {
 }
 
 TEST_F(VideoFileTest, RefusesInALine) {
-    setenv("PATH", (folder_ / "bin").c_str(), 1);
+    const std::string path = std::getenv("PATH");
+    setenv("PATH", folder_.path().c_str(), 1);
     EXPECT_FALSE(hasVideoEncoder());
     const auto missing = VideoFile::create(folder_ / "a.mp4", {.width = 8, .height = 8});
+    setenv("PATH", path.c_str(), 1);
     ASSERT_FALSE(missing);
     EXPECT_EQ(missing.error().code, ErrorCode::Unsupported);
     EXPECT_NE(missing.error().line().find("ffmpeg, which is not installed"), std::string::npos);
-    replaceEncoder("cat >/dev/fd/3\n");
+    const test::EncoderInPath encoder(folder_.path());
     EXPECT_TRUE(hasVideoEncoder());
     EXPECT_FALSE(VideoFile::create(folder_ / "a.avi", {.width = 8, .height = 8}));
     EXPECT_FALSE(VideoFile::create(folder_ / "a.mp4", {.width = 0, .height = 8}));

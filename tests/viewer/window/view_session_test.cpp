@@ -12,8 +12,10 @@
 
 #include <gtest/gtest.h>
 
+#include "octree/dataset_reader.h"
 #include "render/picture.h"
 #include "tests/support/built_ball.h"
+#include "tests/support/encoder_in_path.h"
 #include "viewer/camera/orbit_camera.h"
 #include "viewer/window/window.h"
 
@@ -405,6 +407,60 @@ TEST_F(ViewSessionTest, ATurntableIsAFolderOfPictures) {
     ASSERT_TRUE(isSaved());
     EXPECT_EQ(filesIn("turntable-2").size(), 2u);
     EXPECT_NE(session_->note().find("turntable-2"), std::string::npos) << session_->note();
+}
+
+TEST_F(ViewSessionTest, ATurntableMayBeAVideo) {
+    const test::EncoderInPath encoder(folder_->path());
+    PictureChoice choice = kSmall;
+    choice.video = true;
+    choice.transparent = true;
+    session_->saveTurntable(choice, 3);
+    ASSERT_TRUE(isSaved());
+    session_->saveTurntable(kSmall, 3);
+    ASSERT_TRUE(isSaved());
+    std::string wanted = "1234ftyp";
+    for (const char* name : {"picture-0001.png", "picture-0002.png", "picture-0003.png"}) {
+        const std::vector<uint8_t> rgba = picture(fs::path("turntable-1") / name).rgba;
+        wanted.append(rgba.begin(), rgba.end());
+    }
+    EXPECT_EQ(contentOf("turntable-1.mp4"), wanted) << "opaque, since videos are";
+    session_->saveTurntable(choice, 3);
+    ASSERT_TRUE(turnUntil([&] { return session_->saving()->finished > 0; }));
+    session_->cancelSaving();
+    EXPECT_FALSE(fs::exists("turntable-2.mp4"));
+    EXPECT_NE(session_->note().find("nothing is written"), std::string::npos) << session_->note();
+}
+
+TEST_F(ViewSessionTest, ACutIsDrawnAsItIsSeen) {
+    session_->saveCut(".svg");
+    EXPECT_FALSE(session_->saving()) << "nothing is cut";
+    session_->viewer().setSections({{{0, 0, 2}, 0.5}});
+    for (const std::string extension : {".svg", ".dxf"}) {
+        session_->saveCut(extension);
+        ASSERT_TRUE(session_->saving());
+        EXPECT_EQ(session_->saving()->name, "cut-1" + extension);
+        ASSERT_TRUE(isSaved()) << session_->problem();
+        EXPECT_NE(session_->note().find("cut-1" + extension), std::string::npos) << session_->note();
+    }
+    // The plane z = 0.25, whatever the length of its normal.
+    const auto reader = openFile(*folder_ / "ball.vcp");
+    ASSERT_TRUE(reader);
+    const auto dataset = readDataset(**reader);
+    ASSERT_TRUE(dataset);
+    const CutPlane plane{{0, 0, 1}, 0.25};
+    const auto cut = SurfaceCut::create(*dataset, "ball", 99, {}, plane);
+    ASSERT_TRUE(cut);
+    SectionExportOptions options;
+    options.output = "wanted.svg";
+    options.plane = plane;
+    const auto figures = exportSection(**reader, *cut, options);
+    ASSERT_TRUE(figures) << figures.error().line();
+    EXPECT_NE(session_->note().find(lengthText(figures->length, {})), std::string::npos) << session_->note();
+    session_->viewer().setSections({{{0, 0, 1}, 100}});
+    session_->saveCut(".svg");
+    ASSERT_TRUE(turnUntil([&] { return !session_->saving(); }));
+    EXPECT_NE(session_->problem().find("cuts nothing"), std::string::npos) << session_->problem();
+    EXPECT_FALSE(fs::exists("cut-2.svg"));
 }
 
 TEST_F(ViewSessionTest, APathGoesThroughTheBookmarks) {

@@ -77,6 +77,7 @@ class Stats(TypedDict):
     pages_resident: int
     pages_drawn: int
     device_losses: int
+    processor_rays: bool
 
 class Dataset(TypedDict):
     triangles: int

@@ -1,0 +1,121 @@
+// castCaps, compiled for several instruction sets, as castTile is (tile_caster.cpp).
+#include "render/host/section_caps.h"
+
+#include <optional>
+
+#include <glm/geometric.hpp>
+
+#include "render/host/instruction_sets.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "render/host/section_caps.cpp"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+#include "render/host/ray_caster-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace vcp::HWY_NAMESPACE {
+
+// These are as in trace.comp, which says what they are for.
+constexpr int kMostCrossings = 64;
+constexpr float kPastHit = 0.15f, kOneSheetCosine = 0.6f, kOneSheetCells = 0.6f;
+
+/// Counts the walls that rays cross.
+class WallCounter {
+public:
+    WallCounter(const HostScene& scene, PageMarks* marks) : scene_(scene), caster_(scene, marks) {}
+
+    /// Returns a wall behind a point where the point is inside of the solid: an odd number of walls lies behind. Two of
+    /// three rays decide, for one may graze a wall. `direction`: unit.
+    std::optional<WalkEntry> wallBehind(glm::dvec3 point, glm::vec3 direction) {
+        const glm::vec3& d = direction;
+        const glm::vec3 side = glm::normalize(std::abs(d.z) < 0.7f ? glm::vec3(d.y, -d.x, 0) : glm::vec3(0, d.z, -d.y));
+        int inside = 0, outside = 0;
+        std::optional<WalkEntry> wall;
+        for (const float aside : {0.0f, 0.13f, -0.17f}) {
+            if (inside == 2 || outside == 2) break;
+            const bool isOdd = crossings(point, glm::normalize(d + aside * side), wall) % 2 == 1;
+            ++(isOdd ? inside : outside);
+        }
+        return inside == 2 ? wall : std::nullopt;
+    }
+
+private:
+    /// `first` gets the first wall that any ray crosses.
+    int crossings(glm::dvec3 point, glm::vec3 direction, std::optional<WalkEntry>& first) {
+        caster_.begin(point, direction, RayCaster::kNothing);
+        int count = 0;
+        float from = 0, gap = 0;
+        glm::vec3 before(0);  // normal of the slab that is the wall before; of others 0
+        for (int turn = 0; turn < kMostCrossings; ++turn) {
+            const float distance = caster_.next(from);
+            if (!(distance < RayCaster::kNothing)) break;
+            const WalkEntry& leaf = caster_.hitLeaf();
+            if (!first) first = leaf;
+            const HostScene::Page& page = scene_.page(leaf.page);
+            const auto cell = float(1u << page.cellBits);
+            const glm::vec3 normal = slabNormal(*page.view, leaf.word);
+            const bool isSameSheet =
+                std::abs(glm::dot(normal, before)) > kOneSheetCosine &&
+                std::abs(glm::dot(direction, before)) * (gap + distance - from) < kOneSheetCells * cell;
+            count += isSameSheet ? 0 : 1;
+            before = normal;
+            gap = kPastHit * cell;
+            from = distance + gap;
+        }
+        return count;
+    }
+
+    static glm::vec3 slabNormal(const PageView& view, uint32_t node) {
+        if (nodeType(node) != kNodeSlab) return glm::vec3(0);
+        return f32::decodeDirection(vectorWord(view.faces, slabVector(node)) >> kSlabDirectionShift);
+    }
+
+    const HostScene& scene_;
+    RayCaster caster_;
+};
+
+void setCap(TileHits& hits, int i, double depth, glm::dvec3 normal, const WalkEntry& wall) {
+    if (!hits.any) {
+        std::fill_n(hits.depth, kTilePixels, RayCaster::kNothing);
+        for (float* plane : {hits.normalX, hits.normalY, hits.normalZ}) std::fill_n(plane, kTilePixels, 0.0f);
+        hits.any = true;
+    }
+    hits.depth[i] = float(depth);
+    hits.normalX[i] = float(normal.x), hits.normalY[i] = float(normal.y), hits.normalZ[i] = float(normal.z);
+    hits.onCap.set(size_t(i));
+    if (hits.leaves.empty() || hits.leaves.back().node != wall.word || hits.leaves.back().page != wall.page)
+        hits.leaves.push_back({wall.page, wall.word, {}});
+    hits.leaf[i] = uint32_t(hits.leaves.size() - 1);
+}
+
+void castCapsHere(const HostScene& scene, const PictureRays& rays, TileHits& hits, PageMarks* marks) {
+    WallCounter walls(scene, marks);
+    for (int i = 0; i < kTilePixels; ++i) {
+        const glm::ivec2 in(i % kTileWidth, i / kTileWidth);
+        if (in.x >= hits.size.x || in.y >= hits.size.y) continue;
+        const glm::dvec2 at = glm::dvec2(hits.corner + in) + 0.5;
+        const glm::dvec3 origin = rays.originAt(at.x, at.y), direction = glm::normalize(rays.directionAt(at.x, at.y));
+        const KeptInterval kept = keptInterval(rays.sections, origin, direction);
+        if (kept.begin == nullptr) continue;
+        const glm::dvec3 point = origin + kept.first * direction - scene.grid().origin;
+        if (const auto wall = walls.wallBehind(point / scene.grid().cell, glm::vec3(direction)))
+            setCap(hits, i, kept.first, -glm::dvec3(*kept.begin), *wall);
+    }
+}
+
+}  // namespace vcp::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace vcp {
+
+HWY_EXPORT(castCapsHere);
+
+void castCaps(const HostScene& scene, const PictureRays& rays, TileHits& hits, PageMarks* marks) {
+    if (!rays.sections.empty()) HWY_DYNAMIC_DISPATCH(castCapsHere)(scene, rays, hits, marks);
+}
+
+}  // namespace vcp
+#endif

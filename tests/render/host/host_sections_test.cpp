@@ -1,0 +1,211 @@
+// Sections and caps by the host against those by the shaders, pixel by pixel.
+#include <glm/geometric.hpp>
+
+#include "tests/support/host_comparison.h"
+
+namespace vcp {
+namespace {
+
+using test::Difference;
+using test::drawnBy;
+using test::expectFew;
+using test::kHigh;
+using test::kLow;
+using test::NamedCamera;
+using test::Planes;
+using test::requestOf;
+using test::Scene;
+using test::torusAndBox;
+
+class HostSections : public test::CastByRendererTest {};
+
+/// A plane through a part of a box, which leaves what is on the side of `normal`.
+SectionPlane through(glm::dvec3 lo, glm::dvec3 hi, glm::dvec3 part, glm::dvec3 normal) {
+    return {normal, glm::dot(normal, lo + part * (hi - lo))};
+}
+
+/// One plane and several: slanted, along the axes, a corner, a slice, as many as there may be. None is in a wall of a
+/// grid, or in the mesh.
+std::vector<std::vector<SectionPlane>> cuts(glm::dvec3 lo, glm::dvec3 hi) {
+    const auto plane = [&](glm::dvec3 part, glm::dvec3 normal) { return through(lo, hi, part, normal); };
+    const glm::dvec3 middle(0.503, 0.497, 0.501);
+    return {{plane(middle, {0.2, 0.3, -1})},
+            {plane({0.43, 0.5, 0.5}, {3, 0, 0})},
+            {plane(middle, {0, 0, -1}), plane({0.55, 0.5, 0.5}, {-1, 0.2, 0})},
+            {plane(middle, {1, 0, 0}), plane(middle, {0, -1, 0}), plane(middle, {0, 0, 1})},
+            {plane({0.5, 0.5, 0.45}, {0, 0.1, 1}), plane({0.5, 0.5, 0.55}, {0, -0.1, -1})},
+            {plane({0.21, 0, 0}, {1, 0, 0}), plane({0.79, 0, 0}, {-1, 0, 0}), plane({0, 0.26, 0}, {0, 1, 0}),
+             plane({0, 0.84, 0}, {0, -1, 0}), plane({0, 0, 0.317}, {0, 0, 1}), plane({0, 0, 0.7}, {0.1, 0, -1})}};
+}
+
+TEST_F(HostSections, EveryKindOfLeafFromEveryCamera) {
+    test::AnalyticOptions oneLevel;
+    oneLevel.levels = 1;
+    const auto torus = test::torus(glm::dvec3(8.2, 7.8, 8.1), 4.8, 1.8);
+    const Scene scenes[] = {test::sphereScene(1), test::sceneOf("torus", test::analyticDataset(torus, oneLevel)),
+                            test::cubeScene(1), test::wavesScene(12, 2),
+                            test::sphereScene(1, {483920.0, 3792000.0, 1200.0}, 1.0 / 1024)};
+    for (const bool caps : {false, true}) {
+        Difference all;
+        for (const Scene& scene : scenes) {
+            open(scene);
+            const auto sections = cuts(scene.boxMin, scene.boxMax);
+            const auto cameras = test::cameras(scene);
+            for (size_t i = 0; i < cameras.size(); ++i) {
+                SCOPED_TRACE(scene.name + std::string(", ") + cameras[i].name);
+                FrameRequest request = requestOf(cameras[i].camera);
+                request.sections = sections[i % sections.size()];
+                request.sectionCaps = caps;
+                all += difference(request, scene.dataset->header.cell);
+            }
+        }
+        expectFew(all);
+    }
+}
+
+TEST_F(HostSections, ABuiltMeshInEveryCutAndSeveralLevels) {
+    const test::BuiltMesh built = torusAndBox();
+    ASSERT_TRUE(built.ok());
+    open(built);
+    const auto cameras = test::cameras(kLow, kHigh);
+    const auto sections = cuts(kLow, kHigh);
+    constexpr ShadingMode kModes[] = {ShadingMode::Lit, ShadingMode::Clay, ShadingMode::Unlit, ShadingMode::Normals};
+    for (const double errorPixels : {0.2, 4.0, 30.0})
+        for (const bool caps : {false, true}) {
+            SCOPED_TRACE(errorPixels);
+            Difference all;
+            for (size_t i = 0; i < cameras.size() * 2; ++i) {
+                FrameRequest request = requestOf(cameras[i % cameras.size()].camera);
+                request.errorPixels = errorPixels;
+                request.shading.mode = kModes[i % std::size(kModes)];
+                request.sections = sections[i % sections.size()];
+                request.sectionCaps = caps;
+                all += difference(request, built.cache().dataset().header.cell);
+            }
+            expectFew(all);
+        }
+}
+
+TEST_F(HostSections, FalseColoursOfWhatIsBehindACap) {
+    const test::BuiltMesh built = torusAndBox();
+    ASSERT_TRUE(built.ok());
+    open(built);
+    Difference all;
+    for (const NamedCamera& named : test::cameras(kLow, kHigh))
+        for (const ShadingMode mode : {ShadingMode::Level, ShadingMode::Error}) {
+            FrameRequest request = requestOf(named.camera);
+            request.shading.mode = mode;
+            request.errorPixels = 4;
+            request.sections = cuts(kLow, kHigh)[0];
+            request.sectionCaps = true;
+            all += difference(request, built.cache().dataset().header.cell);
+        }
+    expectFew(all);
+}
+
+// Light comes in by what was cut away, and caps have shadows.
+TEST_F(HostSections, ShadowsAndOcclusion) {
+    const test::BuiltMesh built = torusAndBox();
+    ASSERT_TRUE(built.ok());
+    open(built);
+    const auto sections = cuts(kLow, kHigh);
+    Difference all;
+    uint64_t lighter = 0;
+    const auto cameras = test::cameras(kLow, kHigh);
+    for (size_t i = 0; i < cameras.size(); ++i) {
+        SCOPED_TRACE(cameras[i].name);
+        FrameRequest request = requestOf(cameras[i].camera);
+        request.shading.shadows = true;
+        request.shading.occlusionRays = i % 2 == 0 ? 0 : 4;
+        const Planes whole = drawnBy(*host_, request);
+        request.sections = sections[i % sections.size()];
+        request.sectionCaps = i % 3 != 0;
+        all += difference(request, built.cache().dataset().header.cell);
+        const Planes cut = drawnBy(*host_, request);
+        for (size_t k = 0; k < whole.depth.size(); ++k)
+            if (std::isfinite(cut.depth[k]) && cut.depth[k] == whole.depth[k])
+                lighter += cut.picture.rgba[4 * k] > whole.picture.rgba[4 * k] + 8 ? 1 : 0;
+    }
+    expectFew(all);
+    EXPECT_GT(lighter, 100u);
+}
+
+TEST_F(HostSections, SeveralSamplesOfDatasetsTurnedAndScaled) {
+    const test::BuiltMesh built = torusAndBox();
+    ASSERT_TRUE(built.ok());
+    const Similarity beside{glm::angleAxis(0.7, glm::normalize(glm::dvec3(1, 2, -0.5))), 0.6, {0.5, 0.2, 0.7}};
+    openAll({placed(built.file()), placed(built.file(), beside)});
+    const auto sections = cuts(kLow, kHigh);
+    Difference all;
+    const auto cameras = test::cameras(kLow, kHigh);
+    for (size_t i = 0; i < cameras.size(); ++i) {
+        SCOPED_TRACE(cameras[i].name);
+        FrameRequest request = requestOf(cameras[i].camera);
+        request.shading.shadows = true;
+        request.sections = sections[i % sections.size()];
+        request.sectionCaps = true;
+        all += difference(request, built.cache().dataset().header.cell, 3);
+        EXPECT_EQ(drawnBy(*casting_, request, 3).picture, drawnBy(*host_, request, 3).picture);
+        EXPECT_TRUE(casting_->render(request)->onHost);
+    }
+    expectFew(all, 3);
+}
+
+TEST_F(HostSections, PicksSayWhetherTheyAreOnACap) {
+    const test::BuiltMesh built = torusAndBox();
+    ASSERT_TRUE(built.ok());
+    openAll({placed(built.file())});
+    FrameRequest request = requestOf(test::cameras(kLow, kHigh)[0].camera);
+    request.sections = {through(kLow, kHigh, {0.5, 0.5, 0.5}, {0.2, 0.3, -1})};
+    request.sectionCaps = true;
+    ASSERT_TRUE(renderer_->drawSettled(request));
+    ASSERT_TRUE(casting_->drawSettled(request));
+    uint64_t caps = 0, others = 0, differing = 0;
+    for (uint32_t y = 2; y < request.height; y += 5)
+        for (uint32_t x = 2; x < request.width; x += 5) {
+            const auto device = renderer_->pick(x, y).value(), cast = casting_->pick(x, y).value();
+            if (!device || !cast || device->onCap != cast->onCap) {
+                differing += device || cast ? 1 : 0;
+                continue;
+            }
+            EXPECT_LT(glm::distance(cast->position, device->position), 1e-3);
+            ++(cast->onCap ? caps : others);
+        }
+    EXPECT_LE(differing, 1u);
+    EXPECT_GT(caps, 30u);
+    EXPECT_GT(others, 30u);
+}
+
+// A ball cut open: each pixel of the disc is cap, and none about it; without caps, its far wall is seen.
+TEST_F(HostSections, ABallHasADisc) {
+    const Scene scene = test::sphereScene(1);
+    ASSERT_TRUE(host_->open({{scene.dataset, scene.source, {}}}, {}));
+    const double edge = scene.boxMax.x - scene.boxMin.x, radius = 0.41 * edge;
+    const glm::dvec3 centre = scene.boxMin + glm::dvec3(0.503, 0.497, 0.501) * edge;
+    FrameRequest request = requestOf(fitCamera(scene.boxMin, scene.boxMax, {0, 0, -1}, {0, 1, 0}, 0.6, 4.0 / 3));
+    const double plane = centre.z + 0.1 * radius, toPlane = request.camera.eye.z - plane;
+    const double disc = radius * std::sqrt(1 - 0.01);
+    request.sections = {{{0, 0, -2}, -2 * plane}};
+    for (const bool caps : {false, true}) {
+        request.sectionCaps = caps;
+        const Planes drawn = drawnBy(*host_, request);
+        uint64_t inDisc = 0;
+        for (uint32_t y = 0; y < request.height; ++y)
+            for (uint32_t x = 0; x < request.width; ++x) {
+                const CameraRay ray = cameraRay(request.camera, request.width, request.height, x + 0.5, y + 0.5);
+                const double t = -toPlane / ray.direction.z;
+                const double off = glm::length(glm::dvec2(ray.origin + t * ray.direction - centre));
+                if (std::abs(off - disc) < 0.02 * radius) continue;
+                const size_t at = size_t{y} * request.width + x;
+                const bool isCap = std::abs(drawn.depth[at] - t) < 1e-5 * t;
+                inDisc += off < disc ? 1 : 0;
+                EXPECT_EQ(isCap, caps && off < disc) << x << " " << y;
+                EXPECT_TRUE(!isCap || drawn.normals[at].z > 0.9999f) << x << " " << y;
+                EXPECT_TRUE(off > disc || std::isfinite(drawn.depth[at])) << x << " " << y;
+            }
+        EXPECT_GT(inDisc, 2000u);
+    }
+}
+
+}  // namespace
+}  // namespace vcp
