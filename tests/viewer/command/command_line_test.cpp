@@ -751,7 +751,7 @@ TEST_F(CommandLine, ATurntableIsAVideoOfItsPictures) {
         arguments.insert(arguments.end(), more.begin(), more.end());
         return run(arguments);
     };
-    ASSERT_EQ(render("filmed.png", {"--turntable", "3"}).status, 0);
+    ASSERT_EQ(render("filmed.png", {"--turntable", "3", "--tile", "32"}).status, 0);
     std::string wanted = "1234ftyp";
     for (const char* name : {"filmed-0001.png", "filmed-0002.png", "filmed-0003.png"}) {
         const Picture picture = readPng(*folder_ / name).value();

@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
+#include <glm/ext/vector_uint3_sized.hpp>
 
 #include "tests/support/encoder_in_path.h"
 #include "tests/support/test_folder.h"
@@ -44,7 +45,7 @@ TEST_F(VideoFileTest, FramesGoToTheEncoderAsTheyAre) {
     auto video = VideoFile::create(folder_ / "a.mp4", format);
     ASSERT_TRUE(video) << video.error().line();
     std::string wanted = "1234ftyp";
-    for (const uint8_t grey : {10, 20, 30}) {
+    for (const uint8_t grey : {uint8_t{10}, uint8_t{20}, uint8_t{30}}) {
         std::vector<uint8_t> rgba = frameOf(format, glm::u8vec3(grey));
         rgba[5] = 77;
         wanted.append(rgba.begin(), rgba.end());
