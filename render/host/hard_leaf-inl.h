@@ -27,9 +27,9 @@ HWY_INLINE void enterHardLeaf(const RayGroup& group, const LeafRays& leaf, float
     const GroupSegment s = segmentIn(group, leaf);
     const Lane cells(edge), slack(f32::kIntervalSlack);
     in.from = s.first * cells;
-    in.first = max(in.from - slack, s.begin * cells);
+    in.first = max(in.from - slack, s.kept.begin * cells);
     in.last = mulAdd(s.last, cells, slack);
-    if (leaf.cutCount != 0) in.last = min(in.last, s.end * cells);
+    if (leaf.cutCount != 0) in.last = min(in.last, s.kept.end * cells);
     in.tau = in.weightB = in.weightC = Lane(0.0f);
     in.normal = Lane3(Lane(0.0f), Lane(0.0f), Lane(0.0f));
     in.inside = s.inside;

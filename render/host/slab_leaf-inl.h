@@ -67,7 +67,7 @@ HWY_INLINE Mask castSlabLeaf(const SlabLeaf& slab, const LeafRays& leaf, RayGrou
     }
     const Lane u = min(max(middle, enter), leave);
     // What lies where a ray begins inside the leaf does not count.
-    const Mask fromWall = s.first > s.begin;
+    const Mask fromWall = s.first > s.kept.begin;
     const Mask hit = keptHits(leaf, s, s.inside & (enter <= Lane(1.0f)) & (fromWall | (u > Lane(0.0f))), u);
     if (!any(hit)) return hit;
     keepHits(group, leaf, s, part, hit, u);

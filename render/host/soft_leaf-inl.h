@@ -171,7 +171,7 @@ HWY_INLINE Mask castSoftLeaf(const SoftLeaf& soft, const LeafRays& leaf, RayGrou
     const field::RayField ray = restrictToRay(soft, part.p, part.d);
     // Where a ray begins inside the leaf, that end is no wall.
     const Lane wall(max(Lane(soft.wall), Lane(leaf.rounding)));
-    const Lane wallIn = select(s.first > s.begin, wall, Lane(0.0f));
+    const Lane wallIn = select(s.first > s.kept.begin, wall, Lane(0.0f));
     const Crossing crossing = firstCrossing(ray, s.inside, wallIn, wall, soft.dip);
     const Mask hit = keptHits(leaf, s, crossing.hit, crossing.u);
     if (!any(hit)) return hit;

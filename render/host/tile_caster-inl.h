@@ -44,7 +44,9 @@ private:
         uint32_t nearest = nearOctant_;
         if (!rays_.isParallel)
             nearest = uint32_t(middle.x < 0) | uint32_t(middle.y < 0) << 1 | uint32_t(middle.z < 0) << 2;
-        walk_.pushChildren(at, childrenMet(glm::vec3(middle), float(0.5 * half)), nearest);
+        uint32_t met = childrenMet(glm::vec3(middle), float(0.5 * half));
+        if (!rays_.sections.empty()) met &= childrenKept(glm::vec3(middle), float(0.5 * half));
+        walk_.pushChildren(at, met, nearest);
     }
 
     /// Returns which of the octants about `middle` lie between the tile's outermost planes, and not behind its origin.
@@ -62,7 +64,6 @@ private:
             outside = outside | isBelow(sides_.first, firstRow, c, half, rounding);
             outside = outside | isAbove(sides_.last, lastRow, c, half, rounding);
             outside = outside | (dot(c, spread(ahead)) < -mulAdd(Lane(half), Lane(1.7321f), rounding));
-            for (const SectionCut& plane : rays_.sections) outside = outside | isCutAway(plane, c, half, rounding);
             met |= bitsOf(hn::Not(outside)) << i;
         }
         return met;
@@ -78,9 +79,21 @@ private:
         return heightOver(p, k, c) > Lane(half * p.sum[k]) + rounding;
     }
 
-    static Mask isCutAway(const SectionCut& plane, Lane3 c, float half, Lane rounding) {
-        const glm::vec3 n(plane), size = glm::abs(n);
-        return dot(c, spread(n)) - Lane(plane.w) < -(Lane(half * (size.x + size.y + size.z)) + rounding);
+    /// Returns which of such octants section planes leave a part of.
+    [[nodiscard]] HWY_NOINLINE uint32_t childrenKept(glm::vec3 middle, float half) const {
+        uint32_t kept = 0;
+        for (int i = 0; i < 8; i += kLanes) {
+            const Lane3 c = octantMiddles(i, middle, half);
+            const Lane rounding = (abs(c.x) + abs(c.y) + abs(c.z)) * Lane(kPlaceRounding);
+            Mask isKept = hn::Not(maskOf(0));
+            for (const SectionCut& plane : rays_.sections) {
+                const glm::vec3 n(plane), size = glm::abs(n);
+                const Lane height = dot(c, spread(n)) - Lane(plane.w);
+                isKept = isKept & (height >= -(Lane(half * (size.x + size.y + size.z)) + rounding));
+            }
+            kept |= bitsOf(isKept) << i;
+        }
+        return kept;
     }
 
     /// Returns the groups with rays that may meet a box; arguments as those of childrenMet.
