@@ -103,6 +103,8 @@ inline HWY_NOINLINE GroupSegment cutSegment(const RayGroup& group, const LeafRay
 }
 
 /// The leaf's box is wider by what its rays are rounded by, so that a ray along a wall is in both leaves beside it.
+/// `kIsCut`: whether section planes cut the leaf.
+template <bool kIsCut>
 HWY_INLINE GroupSegment segmentIn(const RayGroup& group, const LeafRays& leaf) {
     GroupSegment s;
     s.start =
@@ -115,13 +117,14 @@ HWY_INLINE GroupSegment segmentIn(const RayGroup& group, const LeafRays& leaf) {
     s.first = max(max(min(x0, x1), min(y0, y1)), max(min(z0, z1), s.kept.begin));
     s.last = min(min(max(x0, x1), max(y0, y1)), max(z0, z1));
     s.inside = group.alive & (s.first <= s.last);
-    if (leaf.cutCount != 0) return cutSegment(group, leaf, s);
+    if constexpr (kIsCut) s = cutSegment(group, leaf, s);
     return s;
 }
 
 /// Returns those hits at u of the part that section planes leave.
-HWY_INLINE Mask keptHits(const LeafRays& leaf, const GroupSegment& s, Mask hit, Lane u) {
-    return leaf.cutCount == 0 ? hit : hit & (mulAdd(u, s.last - s.first, s.first) <= s.kept.end);
+template <bool kIsCut>
+HWY_INLINE Mask keptHits(const GroupSegment& s, Mask hit, Lane u) {
+    return kIsCut ? hit & (mulAdd(u, s.last - s.first, s.first) <= s.kept.end) : hit;
 }
 
 HWY_INLINE Lane clamp01(Lane x) { return min(max(x, Lane(0.0f)), Lane(1.0f)); }

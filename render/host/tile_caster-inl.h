@@ -38,7 +38,7 @@ public:
 
 private:
     /// Pushes the children that rays of the tile may meet, the farthest first.
-    void visitNode(const WalkEntry& at) {
+    HWY_INLINE void visitNode(const WalkEntry& at) {
         const double half = 0.5 * cellsOf(at.bits);
         const glm::dvec3 middle = glm::dvec3(at.corner) * kSubcell + half - rays_.origin;
         uint32_t nearest = nearOctant_;
@@ -126,14 +126,23 @@ private:
         LeafRays leaf = leafRays(rays_, lowest, edge);
         if (!rays_.sections.empty() && !cutLeaf(rays_, lowest, edge, leaf)) return;
         if (!haveRays_) makeGroups();
-        if (nodeType(at.word) == kNodeHard) return castHard(at, leaf, groups);
+        if (leaf.cutCount != 0)
+            castLeaf<true>(at, leaf, groups);
+        else
+            castLeaf<false>(at, leaf, groups);
+    }
+
+    template <bool kIsCut>
+    HWY_INLINE void castLeaf(const WalkEntry& at, const LeafRays& leaf, uint32_t groups) {
+        if (nodeType(at.word) == kNodeHard) return castHard<kIsCut>(at, leaf, groups);
         const PageView& view = *scene_.page(at.page).view;
         if (nodeType(at.word) == kNodeSlab) {
             const SlabLeaf slab = decodeSlabLeaf(view, at.word);
-            return castGroups(at, groups, [&](RayGroup& group) HWY_ATTR { return castSlabLeaf(slab, leaf, group); });
+            return castGroups(at, groups,
+                              [&](RayGroup& group) HWY_ATTR { return castSlabLeaf<kIsCut>(slab, leaf, group); });
         }
         const SoftLeaf soft = decodeSoftLeaf(view, at.word);
-        castGroups(at, groups, [&](RayGroup& group) HWY_ATTR { return castSoftLeaf(soft, leaf, group); });
+        castGroups(at, groups, [&](RayGroup& group) HWY_ATTR { return castSoftLeaf<kIsCut>(soft, leaf, group); });
     }
 
     void makeGroups() {
@@ -168,13 +177,14 @@ private:
         hits_.any = true;
     }
 
+    template <bool kIsCut>
     void castHard(const WalkEntry& at, const LeafRays& leaf, uint32_t groups) {
         const HostScene::Page& page = scene_.page(at.page);
         const float cell = float(1u << page.cellBits), edge = leaf.edge / cell;
         uint32_t active = 0;
         for (groups &= open_; groups != 0; groups &= groups - 1) {
             const int i = std::countr_zero(groups);
-            enterHardLeaf(groups_[i], leaf, edge, inLeaf_[i]);
+            enterHardLeaf<kIsCut>(groups_[i], leaf, edge, inLeaf_[i]);
             if (any(inLeaf_[i].inside)) active |= 1u << i;
         }
         if (active == 0) return;
