@@ -23,13 +23,14 @@ struct GroupInHardLeaf {
     LaneWords triangle;  // what HitLeaf numbers
 };
 
+template <bool kIsCut>
 HWY_INLINE void enterHardLeaf(const RayGroup& group, const LeafRays& leaf, float edge, GroupInHardLeaf& in) {
-    const GroupSegment s = segmentIn(group, leaf);
+    const GroupSegment s = segmentIn<kIsCut>(group, leaf);
     const Lane cells(edge), slack(f32::kIntervalSlack);
     in.from = s.first * cells;
-    in.first = max(in.from - slack, s.begin * cells);
+    in.first = max(in.from - slack, s.kept.begin * cells);
     in.last = mulAdd(s.last, cells, slack);
-    if (leaf.cutCount != 0) in.last = min(in.last, s.end * cells);
+    if (kIsCut) in.last = min(in.last, s.kept.end * cells);
     in.tau = in.weightB = in.weightC = Lane(0.0f);
     in.normal = Lane3(Lane(0.0f), Lane(0.0f), Lane(0.0f));
     in.inside = s.inside;

@@ -73,27 +73,38 @@ HWY_INLINE Lane reachInGroup(Lane perX, Lane perY) {
     return mulAdd(abs(perX), Lane(0.5f * (kGroupWidth - 1)), abs(perY) * Lane(0.5f * (kGroupHeight - 1)));
 }
 
+/// What section planes leave of rays.
+struct KeptSpan {
+    Lane begin, end;
+};
+
 /// The rays of a group in a leaf: `start` in leaf space, and parts of the rays in leaf edges from there.
 struct GroupSegment {
     Lane3 start;
-    Lane begin, end;   // what section planes leave of the rays
-    Lane first, last;  // what is inside of the leaf, from `begin` on
+    KeptSpan kept;     // its end is set where planes cut the leaf
+    Lane first, last;  // what is inside of the leaf, from kept.begin on
     Mask inside;       // rays of which there is such a part
 };
 
-/// Shortens rays to what section planes leave of them.
-inline HWY_NOINLINE void cutSegment(const RayGroup& group, const LeafRays& leaf, GroupSegment& s) {
+/// Returns what section planes leave of a segment.
+inline HWY_NOINLINE GroupSegment cutSegment(const RayGroup& group, const LeafRays& leaf, GroupSegment s) {
+    s.kept.end = Lane(hwy::HighestValue<float>());
     for (int i = 0; i < leaf.cutCount; ++i) {
         const Lane3 n = spread(glm::vec3(leaf.cuts[i]));
         const Lane along = dot(n, group.direction), off = Lane(leaf.cuts[i].w) - dot(n, s.start), t = off / along;
         const Mask ahead = along > Lane(0.0f), back = along < Lane(0.0f);
-        s.begin = select(ahead, max(s.begin, t), s.begin);
-        s.end = select(back, min(s.end, t), s.end);
-        s.end = select(without(off > Lane(0.0f), ahead | back), Lane(hwy::LowestValue<float>()), s.end);
+        s.kept.begin = select(ahead, max(s.kept.begin, t), s.kept.begin);
+        s.kept.end = select(back, min(s.kept.end, t), s.kept.end);
+        s.kept.end = select(without(off > Lane(0.0f), ahead | back), Lane(hwy::LowestValue<float>()), s.kept.end);
     }
+    s.first = max(s.first, s.kept.begin);
+    s.inside = s.inside & (s.first <= min(s.last, s.kept.end));
+    return s;
 }
 
 /// The leaf's box is wider by what its rays are rounded by, so that a ray along a wall is in both leaves beside it.
+/// `kIsCut`: whether section planes cut the leaf.
+template <bool kIsCut>
 HWY_INLINE GroupSegment segmentIn(const RayGroup& group, const LeafRays& leaf) {
     GroupSegment s;
     s.start =
@@ -102,19 +113,18 @@ HWY_INLINE GroupSegment segmentIn(const RayGroup& group, const LeafRays& leaf) {
     const Lane x0 = (low - s.start.x) * group.inverse.x, x1 = (high - s.start.x) * group.inverse.x;
     const Lane y0 = (low - s.start.y) * group.inverse.y, y1 = (high - s.start.y) * group.inverse.y;
     const Lane z0 = (low - s.start.z) * group.inverse.z, z1 = (high - s.start.z) * group.inverse.z;
-    s.begin = Lane(leaf.tauMin);
-    s.end = Lane(hwy::HighestValue<float>());
-    if (leaf.cutCount != 0) cutSegment(group, leaf, s);
-    s.first = max(max(min(x0, x1), min(y0, y1)), max(min(z0, z1), s.begin));
+    s.kept.begin = Lane(leaf.tauMin);
+    s.first = max(max(min(x0, x1), min(y0, y1)), max(min(z0, z1), s.kept.begin));
     s.last = min(min(max(x0, x1), max(y0, y1)), max(z0, z1));
     s.inside = group.alive & (s.first <= s.last);
-    if (leaf.cutCount != 0) s.inside = s.inside & (s.first <= s.end);
+    if constexpr (kIsCut) s = cutSegment(group, leaf, s);
     return s;
 }
 
 /// Returns those hits at u of the part that section planes leave.
-HWY_INLINE Mask keptHits(const LeafRays& leaf, const GroupSegment& s, Mask hit, Lane u) {
-    return leaf.cutCount == 0 ? hit : hit & (mulAdd(u, s.last - s.first, s.first) <= s.end);
+template <bool kIsCut>
+HWY_INLINE Mask keptHits(const GroupSegment& s, Mask hit, Lane u) {
+    return kIsCut ? hit & (mulAdd(u, s.last - s.first, s.first) <= s.kept.end) : hit;
 }
 
 HWY_INLINE Lane clamp01(Lane x) { return min(max(x, Lane(0.0f)), Lane(1.0f)); }

@@ -56,7 +56,7 @@ public:
 
     /// Pushes those children of a node that are in `met`, a bit an octant, and hold anything: last, so that it comes
     /// next, the one in the octant `nearest`, and the one across from it first.
-    void pushChildren(const WalkEntry& at, uint32_t met, uint32_t nearest) {
+    HWY_INLINE void pushChildren(const WalkEntry& at, uint32_t met, uint32_t nearest) {
         const uint32_t bits = at.bits - 1;
         if (at.page == kNoPage) {
             const HostScene::Node& node = scene_.node(at.word);

@@ -41,8 +41,9 @@ HWY_INLINE HalfSpan halfSpan(Lane p, Lane d, bool isUpper) {
 }
 
 /// Casts the rays of a group through a slab leaf. Returns those that hit, with their hits in the group.
+template <bool kIsCut>
 HWY_INLINE Mask castSlabLeaf(const SlabLeaf& slab, const LeafRays& leaf, RayGroup& group) {
-    const GroupSegment s = segmentIn(group, leaf);
+    const GroupSegment s = segmentIn<kIsCut>(group, leaf);
     if (!any(s.inside)) return s.inside;
     const LeafPart part = partInLeaf(group, s);
     const auto& [p, d] = part;
@@ -67,8 +68,8 @@ HWY_INLINE Mask castSlabLeaf(const SlabLeaf& slab, const LeafRays& leaf, RayGrou
     }
     const Lane u = min(max(middle, enter), leave);
     // What lies where a ray begins inside the leaf does not count.
-    const Mask fromWall = s.first > s.begin;
-    const Mask hit = keptHits(leaf, s, s.inside & (enter <= Lane(1.0f)) & (fromWall | (u > Lane(0.0f))), u);
+    const Mask fromWall = s.first > s.kept.begin;
+    const Mask hit = keptHits<kIsCut>(s, s.inside & (enter <= Lane(1.0f)) & (fromWall | (u > Lane(0.0f))), u);
     if (!any(hit)) return hit;
     keepHits(group, leaf, s, part, hit, u);
     group.normal = select(hit, select(dot(n, group.direction) > Lane(0.0f), -n, n), group.normal);

@@ -164,16 +164,17 @@ HWY_INLINE Lane3 softNormal(const SoftLeaf& leaf, Lane3 x, Lane3 direction, Lane
 }
 
 /// Casts the rays of a group through a soft leaf. Returns those that hit, with their hits in the group.
+template <bool kIsCut>
 HWY_INLINE Mask castSoftLeaf(const SoftLeaf& soft, const LeafRays& leaf, RayGroup& group) {
-    const GroupSegment s = segmentIn(group, leaf);
+    const GroupSegment s = segmentIn<kIsCut>(group, leaf);
     if (!any(s.inside)) return s.inside;
     const LeafPart part = partInLeaf(group, s);
     const field::RayField ray = restrictToRay(soft, part.p, part.d);
     // Where a ray begins inside the leaf, that end is no wall.
     const Lane wall(max(Lane(soft.wall), Lane(leaf.rounding)));
-    const Lane wallIn = select(s.first > s.begin, wall, Lane(0.0f));
+    const Lane wallIn = select(s.first > s.kept.begin, wall, Lane(0.0f));
     const Crossing crossing = firstCrossing(ray, s.inside, wallIn, wall, soft.dip);
-    const Mask hit = keptHits(leaf, s, crossing.hit, crossing.u);
+    const Mask hit = keptHits<kIsCut>(s, crossing.hit, crossing.u);
     if (!any(hit)) return hit;
     const Lane3 at = keepHits(group, leaf, s, part, hit, crossing.u);
     const Lane side = sideBefore(ray, crossing.u, part.d);

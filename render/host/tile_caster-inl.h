@@ -38,13 +38,15 @@ public:
 
 private:
     /// Pushes the children that rays of the tile may meet, the farthest first.
-    void visitNode(const WalkEntry& at) {
+    HWY_INLINE void visitNode(const WalkEntry& at) {
         const double half = 0.5 * cellsOf(at.bits);
         const glm::dvec3 middle = glm::dvec3(at.corner) * kSubcell + half - rays_.origin;
         uint32_t nearest = nearOctant_;
         if (!rays_.isParallel)
             nearest = uint32_t(middle.x < 0) | uint32_t(middle.y < 0) << 1 | uint32_t(middle.z < 0) << 2;
-        walk_.pushChildren(at, childrenMet(glm::vec3(middle), float(0.5 * half)), nearest);
+        uint32_t met = childrenMet(glm::vec3(middle), float(0.5 * half));
+        if (!rays_.sections.empty()) met &= childrenKept(glm::vec3(middle), float(0.5 * half));
+        walk_.pushChildren(at, met, nearest);
     }
 
     /// Returns which of the octants about `middle` lie between the tile's outermost planes, and not behind its origin.
@@ -62,7 +64,6 @@ private:
             outside = outside | isBelow(sides_.first, firstRow, c, half, rounding);
             outside = outside | isAbove(sides_.last, lastRow, c, half, rounding);
             outside = outside | (dot(c, spread(ahead)) < -mulAdd(Lane(half), Lane(1.7321f), rounding));
-            for (const SectionCut& plane : rays_.sections) outside = outside | isCutAway(plane, c, half, rounding);
             met |= bitsOf(hn::Not(outside)) << i;
         }
         return met;
@@ -78,9 +79,21 @@ private:
         return heightOver(p, k, c) > Lane(half * p.sum[k]) + rounding;
     }
 
-    static Mask isCutAway(const SectionCut& plane, Lane3 c, float half, Lane rounding) {
-        const glm::vec3 n(plane), size = glm::abs(n);
-        return dot(c, spread(n)) - Lane(plane.w) < -(Lane(half * (size.x + size.y + size.z)) + rounding);
+    /// Returns which of such octants section planes leave a part of.
+    [[nodiscard]] HWY_NOINLINE uint32_t childrenKept(glm::vec3 middle, float half) const {
+        uint32_t kept = 0;
+        for (int i = 0; i < 8; i += kLanes) {
+            const Lane3 c = octantMiddles(i, middle, half);
+            const Lane rounding = (abs(c.x) + abs(c.y) + abs(c.z)) * Lane(kPlaceRounding);
+            Mask isKept = hn::Not(maskOf(0));
+            for (const SectionCut& plane : rays_.sections) {
+                const glm::vec3 n(plane), size = glm::abs(n);
+                const Lane height = dot(c, spread(n)) - Lane(plane.w);
+                isKept = isKept & (height >= -(Lane(half * (size.x + size.y + size.z)) + rounding));
+            }
+            kept |= bitsOf(isKept) << i;
+        }
+        return kept;
     }
 
     /// Returns the groups with rays that may meet a box; arguments as those of childrenMet.
@@ -113,14 +126,23 @@ private:
         LeafRays leaf = leafRays(rays_, lowest, edge);
         if (!rays_.sections.empty() && !cutLeaf(rays_, lowest, edge, leaf)) return;
         if (!haveRays_) makeGroups();
-        if (nodeType(at.word) == kNodeHard) return castHard(at, leaf, groups);
+        if (leaf.cutCount != 0)
+            castLeaf<true>(at, leaf, groups);
+        else
+            castLeaf<false>(at, leaf, groups);
+    }
+
+    template <bool kIsCut>
+    HWY_INLINE void castLeaf(const WalkEntry& at, const LeafRays& leaf, uint32_t groups) {
+        if (nodeType(at.word) == kNodeHard) return castHard<kIsCut>(at, leaf, groups);
         const PageView& view = *scene_.page(at.page).view;
         if (nodeType(at.word) == kNodeSlab) {
             const SlabLeaf slab = decodeSlabLeaf(view, at.word);
-            return castGroups(at, groups, [&](RayGroup& group) HWY_ATTR { return castSlabLeaf(slab, leaf, group); });
+            return castGroups(at, groups,
+                              [&](RayGroup& group) HWY_ATTR { return castSlabLeaf<kIsCut>(slab, leaf, group); });
         }
         const SoftLeaf soft = decodeSoftLeaf(view, at.word);
-        castGroups(at, groups, [&](RayGroup& group) HWY_ATTR { return castSoftLeaf(soft, leaf, group); });
+        castGroups(at, groups, [&](RayGroup& group) HWY_ATTR { return castSoftLeaf<kIsCut>(soft, leaf, group); });
     }
 
     void makeGroups() {
@@ -155,13 +177,14 @@ private:
         hits_.any = true;
     }
 
+    template <bool kIsCut>
     void castHard(const WalkEntry& at, const LeafRays& leaf, uint32_t groups) {
         const HostScene::Page& page = scene_.page(at.page);
         const float cell = float(1u << page.cellBits), edge = leaf.edge / cell;
         uint32_t active = 0;
         for (groups &= open_; groups != 0; groups &= groups - 1) {
             const int i = std::countr_zero(groups);
-            enterHardLeaf(groups_[i], leaf, edge, inLeaf_[i]);
+            enterHardLeaf<kIsCut>(groups_[i], leaf, edge, inLeaf_[i]);
             if (any(inLeaf_[i].inside)) active |= 1u << i;
         }
         if (active == 0) return;

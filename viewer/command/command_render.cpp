@@ -139,7 +139,6 @@ FrameRequest requestFor(const RenderCommand& command, const SceneFile& scene, co
 Result<void> checkHost(const RenderCommand& command) {
     FrameRequest request;
     request.shading = command.render.shading;
-    request.sections.resize(command.render.sections.size());
     return checkHostDraws(request);
 }
 
