@@ -17,8 +17,8 @@ void MeshSample::addVertices(std::span<const glm::dvec3> positions) {
 }
 
 void MeshSample::addTriangle(const WorldTriangle<double>& t) {
-    const std::scoped_lock lock(mutex_);
     if (!triangles_.wantsNext()) return;
+    const std::scoped_lock lock(mutex_);
     triangles_.keep({.corner = {glm::vec3(t.corner[0] - origin_), glm::vec3(t.corner[1] - origin_),
                                 glm::vec3(t.corner[2] - origin_)},
                      .colour = t.colour[0]});

@@ -64,7 +64,7 @@ public:
     [[nodiscard]] Snapshot snapshot() const;
 
 private:
-    mutable std::mutex mutex_;  // guards all
+    mutable std::mutex mutex_;  // guards all that is kept; what comes is counted by the thread that adds
     uint64_t version_ = 0;
     glm::dvec3 origin_{0}, low_{0}, high_{0};
     EvenSample<glm::vec3> vertices_;

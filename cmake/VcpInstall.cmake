@@ -9,7 +9,7 @@ function(vcp_dependency_line result target)
         Threads::Threads Threads glm::glm glm fmt::fmt fmt TBB::tbb TBB Vulkan::Vulkan Vulkan Vulkan::Headers Vulkan
         PNG::PNG PNG glfw glfw3 FastFloat::fast_float FastFloat nlohmann_json::nlohmann_json nlohmann_json
         spdlog::spdlog spdlog CLI11::CLI11 CLI11 ZLIB::ZLIB ZLIB CURL::libcurl CURL JPEG::JPEG JPEG imgui::imgui imgui
-        meshoptimizer::meshoptimizer meshoptimizer)
+        meshoptimizer::meshoptimizer meshoptimizer Freetype::Freetype Freetype)
     set(line "")
     if(target MATCHES "^PkgConfig::(.+)$")
         set(module ${CMAKE_MATCH_1})

@@ -129,7 +129,7 @@ Result<void> Viewer::open(std::vector<PlacedDataset> datasets, const MesoScene& 
 void Viewer::show(const std::vector<PlacedDataset>& datasets, const MesoScene& surfaces, const OrbitCamera& camera,
                   std::string name) {
     dataset_ = datasets.empty() ? nullptr : datasets.front().dataset;
-    isOpen_ = true;
+    isOpen_ = hasBounds_ = true;
     isPaper_ = !datasets.empty() && surfaces.surfaces.empty();
     bounds_ = surfaces.bounds;
     status_.triangles = status_.levels = 0;
@@ -164,7 +164,7 @@ Result<void> Viewer::setBudget(uint64_t bytes) {
 }
 
 void Viewer::foresee(const Box& bounds, const OrbitCamera& camera) {
-    isForeseen_ = true;
+    hasBounds_ = true;
     bounds_ = bounds;
     camera_ = camera;
 }
@@ -214,7 +214,7 @@ glm::dvec3 Viewer::pointOfInterest(glm::dvec2 pixel) {
 }
 
 void Viewer::press(MouseButton button, glm::dvec2 pixel, Modifiers modifiers) {
-    if (drag_ != Drag::None || !hasSize() || !(isOpen_ || isForeseen_)) return;
+    if (drag_ != Drag::None || !hasSize() || !hasBounds_) return;
     move_.reset();
     dragButton_ = button;
     cursor_ = pixel;
@@ -311,7 +311,7 @@ bool Viewer::cancelSectionDrag() {
 }
 
 void Viewer::scroll(glm::dvec2 pixel, double steps, bool shift) {
-    if (!hasSize() || !(isOpen_ || isForeseen_) || steps == 0) return;
+    if (!hasSize() || !hasBounds_ || steps == 0) return;
     if (shift && !sections_.empty()) return moveSections(steps);
     move_.reset();
     if (isFlying_) {

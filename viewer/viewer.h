@@ -267,8 +267,8 @@ private:
     std::unique_ptr<Renderer> renderer_;
     std::shared_ptr<const Dataset> dataset_;
     bool isOpen_ = false;
-    bool isForeseen_ = false;  // the camera may be moved, though nothing is open
-    bool isPaper_ = false;     // all datasets are of the method `paper`
+    bool hasBounds_ = false;  // of what is open or foreseen: the camera may be moved
+    bool isPaper_ = false;    // all datasets are of the method `paper`
     Box bounds_;
     OrbitCamera camera_, home_;
     Shading shading_;

@@ -2,8 +2,6 @@
 // is inside of the solid (isInside of render/shaders/trace.comp).
 #pragma once
 
-#include <span>
-
 #include "render/host/host_scene.h"
 #include "render/host/page_marks.h"
 #include "render/host/picture_rays.h"

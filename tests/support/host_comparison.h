@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include <gtest/gtest.h>
@@ -79,6 +80,40 @@ inline Difference compare(const Planes& host, const Planes& device, double cell)
         }
         d.colour += channelsApart(host.picture, device.picture, i) > 2 ? 1 : 0;
     }
+    return d;
+}
+
+/// Datasets of one level that show every kind of leaf, one of them far from the origin and small.
+inline std::vector<Scene> scenesOfEveryLeaf() {
+    AnalyticOptions oneLevel;
+    oneLevel.levels = 1;
+    oneLevel.axis = 2;
+    return {sphereScene(1), sceneOf("torus", analyticDataset(torus(glm::dvec3(8.2, 7.8, 8.1), 4.8, 1.8), oneLevel)),
+            cubeScene(1), wavesScene(12, 2), sphereScene(1, {483920.0, 3792000.0, 1200.0}, 1.0 / 1024)};
+}
+
+/// What two renderers pick, every few pixels of what they drew last. A pixel differs where but one has a hit, or
+/// where but one is on a cap.
+struct PickDifference {
+    std::array<uint64_t, 2> ofDataset{};  ///< picks that agree, by dataset
+    uint64_t caps = 0;                    ///< picks that agree and are on a cap
+    uint64_t differing = 0;
+};
+inline PickDifference comparePicks(Renderer& cast, Renderer& device, const FrameRequest& request) {
+    PickDifference d;
+    for (uint32_t y = 2; y < request.height; y += 5)
+        for (uint32_t x = 2; x < request.width; x += 5) {
+            const auto a = cast.pick(x, y).value(), b = device.pick(x, y).value();
+            if (!a && !b) continue;
+            if (!a || !b || a->onCap != b->onCap) {
+                ++d.differing;
+                continue;
+            }
+            EXPECT_EQ(a->dataset, b->dataset);
+            EXPECT_LT(glm::distance(a->position, b->position), 1e-3);
+            ++d.ofDataset.at(a->dataset);
+            d.caps += a->onCap ? 1 : 0;
+        }
     return d;
 }
 

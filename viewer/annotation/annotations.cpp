@@ -6,6 +6,7 @@
 #include <vector>
 
 #include <glm/common.hpp>
+#include <glm/geometric.hpp>
 
 #include "viewer/annotation/projector.h"
 
@@ -20,6 +21,7 @@ constexpr double kScaleBarLargest = 160, kScaleBarEnds = 4, kScaleBarText = 10;
 constexpr double kLegendWidth = 208, kLegendPadding = 8, kLegendBar = 10, kLegendGap = 4;
 constexpr double kLegendPart = 0.4;  // of the picture's width, at most, where its title is not wider
 constexpr double kScaleBarHeight = 44;
+constexpr double kPointRadius = 6, kPointText = 12;
 // A picture so large has units of a pixel.
 constexpr glm::dvec2 kUsualSize(1280, 800);
 constexpr double kLeastUnit = 0.8;
@@ -56,6 +58,28 @@ public:
         }
     }
 
+    /// Marks the points; a title that would cover another one's is left out, and none stands outside of the picture.
+    void drawPoints() const {
+        const Projector projector(view_.camera, view_.size);
+        std::vector<Box2> taken;
+        for (const Annotation& point : annotations_.points) {
+            const auto at = projector.point(point.position);
+            if (!at || !isInRoom(*at)) continue;
+            canvas_.disc(*at, units(kPointRadius), AnnotationInk::Plate);
+            canvas_.disc(*at, units(kPointRadius - 2), AnnotationInk::Mark);
+            if (point.title.empty()) continue;
+            const glm::dvec2 size = canvas_.textSize(point.title), border = glm::dvec2(units(kPlateX), units(kPlateY));
+            const double right = at->x + units(kPointText) + border.x;
+            const bool isLeft = right + size.x + border.x > view_.high.x;
+            const double left = isLeft ? at->x - units(kPointText) - border.x - size.x : right;
+            const glm::dvec2 from(left, at->y - 0.5 * size.y);
+            const Box2 plate{from - border, from + size + border};
+            if (std::ranges::any_of(taken, [&](const Box2& other) { return plate.doesTouch(other); })) continue;
+            taken.push_back(plate);
+            write(from, point.title);
+        }
+    }
+
     /// Returns where it ends at the right.
     [[nodiscard]] double drawScaleBar() const {
         const double unitsPerPixel = view_.viewHeight / double(view_.size.y);
@@ -89,7 +113,17 @@ public:
     }
 
 private:
+    struct Box2 {
+        glm::dvec2 low, high;
+        [[nodiscard]] bool doesTouch(const Box2& other) const {
+            return low.x < other.high.x && other.low.x < high.x && low.y < other.high.y && other.low.y < high.y;
+        }
+    };
+
     [[nodiscard]] double units(double n) const { return n * view_.unit; }
+    [[nodiscard]] bool isInRoom(glm::dvec2 at) const {
+        return at.x >= view_.low.x && at.x < view_.high.x && at.y >= view_.low.y && at.y < view_.high.y;
+    }
     void write(glm::dvec2 at, const std::string& text) const { writeOnPlate(canvas_, at, text, view_.unit); }
 
     /// Returns how wide a legend is, with what is around it.
@@ -162,9 +196,19 @@ AnnotatedView annotatedPicture(const Camera& camera, double viewHeight, glm::uve
             .unit = std::max(std::min(parts.x, parts.y), kLeastUnit)};
 }
 
+std::optional<size_t> annotationAt(const std::vector<Annotation>& points, const AnnotatedView& view, glm::dvec2 pixel) {
+    const Projector projector(view.camera, view.size);
+    for (size_t i = points.size(); i-- > 0;)
+        if (const auto at = projector.point(points[i].position);
+            at && glm::distance(*at, pixel) <= (kPointRadius + 2) * view.unit)
+            return i;
+    return std::nullopt;
+}
+
 void draw(const Annotations& annotations, const AnnotatedView& view, AnnotationCanvas& canvas) {
     const Layout layout(annotations, view, canvas);
     layout.drawLines();
+    layout.drawPoints();
     layout.drawLegends(annotations.hasScaleBar ? layout.drawScaleBar() : view.low.x);
 }
 

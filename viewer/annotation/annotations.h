@@ -1,5 +1,5 @@
-// What is written over a picture: legends, a scale bar, measured lines with their lengths. One layout for the window,
-// which draws it with its own fonts, and for pictures in files (picture_canvas.h).
+// What is written over a picture: legends, a scale bar, measured lines with their lengths, titles at points. One layout
+// for the window, which draws it with its own fonts, and for pictures in files (picture_canvas.h).
 #pragma once
 
 #include <optional>
@@ -21,10 +21,20 @@ struct AnnotatedLine {
     std::vector<std::string> lengths;  ///< written beside each line; one less than points
 };
 
+/// What a person wrote at a point.
+struct Annotation {
+    glm::dvec3 position{0};  ///< world
+    std::string title;       ///< one line, UTF-8
+    std::string text = {};   ///< one line; panels show it, pictures do not
+
+    bool operator==(const Annotation&) const = default;
+};
+
 struct Annotations {
     std::vector<Legend> legends;  ///< from below upwards
     bool hasScaleBar = false;
     std::vector<AnnotatedLine> lines;
+    std::vector<Annotation> points = {};
     std::optional<LengthUnit> unit;  ///< the world's, for the scale bar
 };
 
@@ -57,6 +67,9 @@ public:
     virtual void text(glm::dvec2 at, const std::string& text) = 0;
     [[nodiscard]] virtual glm::dvec2 textSize(const std::string& text) const = 0;
 };
+
+/// Returns the point of `points` that is marked within reach of a pixel, the last one drawn first; nothing without any.
+std::optional<size_t> annotationAt(const std::vector<Annotation>& points, const AnnotatedView& view, glm::dvec2 pixel);
 
 /// Draws all of it. What has no room is left out.
 void draw(const Annotations& annotations, const AnnotatedView& view, AnnotationCanvas& canvas);

@@ -4,7 +4,7 @@
 
 #include <glm/common.hpp>
 
-#include "viewer/annotation/stroke_text.h"
+#include "viewer/annotation/picture_text.h"
 
 namespace vcp {
 

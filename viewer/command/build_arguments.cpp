@@ -6,9 +6,9 @@
 #include <fmt/ranges.h>
 
 #include "builder/mesh/open_mesh.h"
-#include "viewer/command/help_text.h"
-#include "viewer/command/interrupt.h"
+#include "viewer/command/manual/help_text.h"
 #include "viewer/command/parsed_option.h"
+#include "viewer/command/terminal/interrupt.h"
 #include "viewer/scene/option_values.h"
 
 namespace vcp {

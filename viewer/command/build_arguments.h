@@ -7,7 +7,7 @@
 
 #include "builder/build.h"
 #include "viewer/command/commands.h"
-#include "viewer/command/progress_display.h"
+#include "viewer/command/terminal/progress_display.h"
 #include "viewer/scene/scene_opening.h"
 
 namespace vcp {

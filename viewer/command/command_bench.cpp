@@ -13,10 +13,10 @@
 #include "viewer/bench/stress/bench_stream.h"
 #include "viewer/bench/stress/stress_path.h"
 #include "viewer/command/commands.h"
-#include "viewer/command/interrupt.h"
 #include "viewer/command/paper_arguments.h"
 #include "viewer/command/parsed_option.h"
 #include "viewer/command/source_arguments.h"
+#include "viewer/command/terminal/interrupt.h"
 #include "viewer/scene/option_values.h"
 
 namespace vcp {

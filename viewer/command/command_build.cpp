@@ -8,9 +8,9 @@
 #include "builder/paper/paper_file.h"
 #include "viewer/command/build_arguments.h"
 #include "viewer/command/commands.h"
-#include "viewer/command/help_text.h"
-#include "viewer/command/interrupt.h"
+#include "viewer/command/manual/help_text.h"
 #include "viewer/command/paper_arguments.h"
+#include "viewer/command/terminal/interrupt.h"
 #include "viewer/scene/option_values.h"
 
 namespace vcp {

@@ -6,11 +6,11 @@
 
 #include "builder/measure/mesh_deviation.h"
 #include "viewer/command/commands.h"
-#include "viewer/command/help_text.h"
-#include "viewer/command/interrupt.h"
+#include "viewer/command/manual/help_text.h"
 #include "viewer/command/parsed_option.h"
 #include "viewer/command/render_arguments.h"
 #include "viewer/command/source_arguments.h"
+#include "viewer/command/terminal/interrupt.h"
 #include "viewer/export/deviation_picture.h"
 #include "viewer/export/surface_mesh.h"
 #include "viewer/scene/inputs.h"

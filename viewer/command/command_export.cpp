@@ -5,10 +5,10 @@
 #include <fmt/format.h>
 
 #include "viewer/command/commands.h"
-#include "viewer/command/help_text.h"
-#include "viewer/command/interrupt.h"
+#include "viewer/command/manual/help_text.h"
 #include "viewer/command/parsed_option.h"
 #include "viewer/command/source_arguments.h"
+#include "viewer/command/terminal/interrupt.h"
 #include "viewer/export/mesh_export.h"
 #include "viewer/export/section_export.h"
 #include "viewer/scene/option_values.h"

@@ -2,8 +2,8 @@
 #include <fmt/format.h>
 
 #include "viewer/command/commands.h"
-#include "viewer/command/interrupt.h"
 #include "viewer/command/source_arguments.h"
+#include "viewer/command/terminal/interrupt.h"
 #include "viewer/scene/option_values.h"
 
 namespace vcp {

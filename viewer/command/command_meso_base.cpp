@@ -9,7 +9,7 @@
 #include "mesostructure/base/base_file.h"
 #include "mesostructure/base/decimation.h"
 #include "mesostructure/base/surface_edges.h"
-#include "viewer/command/interrupt.h"
+#include "viewer/command/terminal/interrupt.h"
 #include "viewer/scene/option_values.h"
 
 namespace vcp {

@@ -10,12 +10,12 @@
 #include "viewer/annotation/picture_canvas.h"
 #include "viewer/camera/camera_path.h"
 #include "viewer/command/build_arguments.h"
-#include "viewer/command/help_text.h"
-#include "viewer/command/interrupt.h"
+#include "viewer/command/manual/help_text.h"
 #include "viewer/command/parsed_option.h"
 #include "viewer/command/render_arguments.h"
 #include "viewer/command/render_command.h"
 #include "viewer/command/render_outputs.h"
+#include "viewer/command/terminal/interrupt.h"
 #include "viewer/picture/image_files.h"
 #include "viewer/scene/option_values.h"
 #include "viewer/scene/scene_opening.h"
@@ -33,21 +33,22 @@ bool hasDarkBackground(const Shading& shading) {
     return glm::dot(middle, glm::vec3(0.2126f, 0.7152f, 0.0722f)) < kMiddleGrey;
 }
 
-/// Returns what writes legend and scale bar over pictures from the cameras; empty where none is asked for. Errors:
-/// Usage, where there is nothing that a legend says.
-Result<PaintRows> paintOverOf(const RenderCommand& command, const LegendSubject& subject,
+/// Returns what writes legend, scale bar and the scene's annotations over pictures from the cameras; empty where there
+/// is none. Errors: Usage, where there is nothing that a legend says.
+Result<PaintRows> paintOverOf(const RenderCommand& command, const OpenedScene& open,
                               const std::vector<OrbitCamera>& cameras) {
     Annotations annotations{.legends = {}, .hasScaleBar = command.scaleBar, .lines = {}, .unit = command.render.unit};
+    if (command.annotations) annotations.points = open.file.annotations;
     const Shading& shading = command.render.shading;
     if (command.legend) {
-        annotations.legends = legendsOf(shading.mode, subject);
+        annotations.legends = legendsOf(shading.mode, open.legendSubject());
         if (annotations.legends.empty())
             return Error{.code = ErrorCode::Usage,
                          .message =
                              "--legend goes with --shading steps, cells, fetches, level or error, on files that "
                              "have such numbers"};
     }
-    if (!command.legend && !command.scaleBar) return PaintRows();
+    if (!command.legend && !command.scaleBar && annotations.points.empty()) return PaintRows();
     std::vector<AnnotatedView> views;
     for (const OrbitCamera& camera : cameras)
         views.push_back(annotatedPicture(camera.current(), camera.viewHeight(), glm::uvec2(command.size)));
@@ -79,8 +80,7 @@ Result<void> checkOptions(const RenderCommand& command) {
     if (command.isVideo() && !command.isSequence())
         return usage("a video needs --turntable or --path, which say what it shows");
     if (command.isVideo() && command.transparent) return usage("a video has no transparency; leave out --transparent");
-    if (command.isVideo() && !hasVideoEncoder())
-        return usage("a video needs the program ffmpeg, which is not installed; name a .png for numbered pictures");
+    if (command.isVideo() && !hasVideoEncoder()) return usage(kNoVideoEncoder);
     if (command.legend && !isFalseColour(command.render.shading.mode))
         return usage("--legend goes with --shading steps, cells, fetches, level or error");
     if (command.methods.empty()) return {};
@@ -159,7 +159,7 @@ Result<Json> render(const RenderCommand& command) {
                                           ? *scene.camera
                                           : command.render.cameraFor(bounds, command.size));
     VCP_TRY_ASSIGN(const auto cameras, camerasOf(command, camera, bounds));
-    VCP_TRY_ASSIGN(const auto paintOver, paintOverOf(command, open.legendSubject(), cameras));
+    VCP_TRY_ASSIGN(const auto paintOver, paintOverOf(command, open, cameras));
     const OutputRules rules = rulesOf(command, open.filesRead);
     VCP_TRY(checkOutputs(command, rules, cameras.size()));
     RendererOptions options = command.render.rendererOptions();
@@ -274,6 +274,7 @@ Command addRender(CLI::App& vcp) {
         ->check(checkPlane);
     addRenderSettings(*app, command->render);
     beginGroup(*app, help_group::kWritten);
+    app->add_flag("!--no-annotations", command->annotations, "Leave out the annotations of a scene file");
     app->add_flag("--legend", command->legend, "Write into the picture what its false colours mean");
     app->add_flag("--scale-bar", command->scaleBar, "Write into the picture how long a length is in it");
     beginGroup(*app, help_group::kLook);

@@ -10,9 +10,9 @@
 #include "viewer/bench/stress/stress.h"
 #include "viewer/bench/stress/stress_path.h"
 #include "viewer/command/commands.h"
-#include "viewer/command/interrupt.h"
 #include "viewer/command/parsed_option.h"
 #include "viewer/command/source_arguments.h"
+#include "viewer/command/terminal/interrupt.h"
 #include "viewer/scene/render_settings.h"
 
 namespace vcp {

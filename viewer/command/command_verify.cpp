@@ -8,9 +8,9 @@
 #include "streaming/http_reader.h"
 #include "streaming/read_ahead.h"
 #include "viewer/command/commands.h"
-#include "viewer/command/help_text.h"
-#include "viewer/command/interrupt.h"
+#include "viewer/command/manual/help_text.h"
 #include "viewer/command/source_arguments.h"
+#include "viewer/command/terminal/interrupt.h"
 #include "viewer/scene/option_values.h"
 
 namespace vcp {

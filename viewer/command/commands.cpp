@@ -6,8 +6,8 @@
 #include <filesystem>
 
 #include "octree/io/output_file.h"
-#include "viewer/command/help_text.h"
-#include "viewer/command/terminal_text.h"
+#include "viewer/command/manual/help_text.h"
+#include "viewer/command/terminal/terminal_text.h"
 
 namespace vcp {
 

@@ -12,7 +12,7 @@
 #include <nlohmann/json.hpp>
 
 #include "octree/io/result.h"
-#include "viewer/command/progress_display.h"
+#include "viewer/command/terminal/progress_display.h"
 
 namespace vcp {
 

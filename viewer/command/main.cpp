@@ -7,10 +7,10 @@
 #include "octree/io/caught.h"
 #include "streaming/web_address.h"
 #include "viewer/command/commands.h"
-#include "viewer/command/help_text.h"
+#include "viewer/command/manual/help_text.h"
 #include "viewer/command/option_names.h"
-#include "viewer/command/suggestion.h"
-#include "viewer/command/terminal_text.h"
+#include "viewer/command/terminal/suggestion.h"
+#include "viewer/command/terminal/terminal_text.h"
 
 namespace vcp {
 

@@ -6,7 +6,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "viewer/command/help_text.h"
+#include "viewer/command/manual/help_text.h"
 
 namespace vcp {
 

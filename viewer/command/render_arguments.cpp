@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "viewer/command/help_text.h"
+#include "viewer/command/manual/help_text.h"
 #include "viewer/command/paper_arguments.h"
 #include "viewer/command/parsed_option.h"
 #include "viewer/command/source_arguments.h"

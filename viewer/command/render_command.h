@@ -34,7 +34,7 @@ struct RenderCommand {
     uint32_t tile = 0;  // 0: not given
     uint32_t samples = kUsualSamples;
     bool transparent = false;
-    bool legend = false, scaleBar = false;
+    bool legend = false, scaleBar = false, annotations = true;
     int turntable = 0;
     std::string path;
     int framesPerSecond = 30;

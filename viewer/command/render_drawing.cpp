@@ -8,10 +8,10 @@
 
 #include "builder/measure/quantile.h"
 #include "render/pixel_samples.h"
-#include "viewer/command/interrupt.h"
 #include "viewer/command/method_panels.h"
 #include "viewer/command/parsed_option.h"
 #include "viewer/command/render_command.h"
+#include "viewer/command/terminal/interrupt.h"
 #include "viewer/picture/image_files.h"
 #include "viewer/scene/option_values.h"
 

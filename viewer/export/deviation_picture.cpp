@@ -9,7 +9,7 @@
 
 #include "builder/measure/mesh_samples.h"
 #include "builder/stream/colour_encoding.h"
-#include "viewer/annotation/stroke_text.h"
+#include "viewer/annotation/picture_text.h"
 #include "viewer/export/diverging_colours.h"
 
 namespace vcp {

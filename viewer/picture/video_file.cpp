@@ -48,9 +48,7 @@ std::vector<std::string> argumentsFor(OutputKind kind, const VideoFormat& format
 }
 
 Error noEncoder(const fs::path& path) {
-    return {.code = ErrorCode::Unsupported,
-            .message = "a video needs the program ffmpeg, which is not installed; name a .png for numbered pictures",
-            .file = path.string()};
+    return {.code = ErrorCode::Unsupported, .message = kNoVideoEncoder, .file = path.string()};
 }
 
 }  // namespace

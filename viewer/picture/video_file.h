@@ -19,6 +19,8 @@ struct VideoFormat {
 /// Whether the name says a video that can be written: .mp4 (H.264) or .webm (VP9).
 bool isVideoPath(const std::filesystem::path& path);
 
+inline constexpr const char* kNoVideoEncoder =
+    "a video needs the program ffmpeg, which is not installed; name a .png for numbered pictures";
 /// Whether ffmpeg is installed where programs are looked for.
 bool hasVideoEncoder();
 

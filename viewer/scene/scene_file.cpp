@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <type_traits>
 
 #include <fmt/format.h>
 #include <glm/common.hpp>
@@ -44,7 +45,7 @@ public:
     SceneFile scene(const Json& json) {
         SceneFile scene;
         if (!json.is_object()) return wrong("", "a scene must be a JSON object"), scene;
-        onlyKeys(json, "", {"datasets", "lights", "camera", "sections", "caps", "mesostructure"});
+        onlyKeys(json, "", {"datasets", "lights", "camera", "sections", "caps", "annotations", "mesostructure"});
         if (json.contains("mesostructure")) scene.surfaces = surfaces(json["mesostructure"]);
         if (!json.contains("datasets") && scene.surfaces.empty()) wrong("", "\"datasets\" is missing");
         const Json& datasets = json.value("datasets", Json::array());
@@ -57,7 +58,27 @@ public:
         if (json.contains("camera")) scene.camera = camera(json["camera"]);
         if (json.contains("sections")) scene.sections = sections(json["sections"]);
         if (json.contains("caps")) scene.sectionCaps = flag(json["caps"], "/caps");
+        if (json.contains("annotations")) scene.annotations = annotations(json["annotations"]);
         return scene;
+    }
+
+    std::vector<Annotation> annotations(const Json& json) {
+        std::vector<Annotation> all;
+        if (!json.is_array() || json.size() > kMostAnnotations)
+            return wrong("/annotations", fmt::format("must be a list of at most {}", kMostAnnotations)), all;
+        for (size_t i = 0; i < json.size() && !error_; ++i) {
+            const std::string at = fmt::format("/annotations/{}", i);
+            if (!isObject(json[i], at)) return all;
+            onlyKeys(json[i], at, {"position", "title", "text"});
+            Annotation& made = all.emplace_back();
+            if (json[i].contains("position"))
+                made.position = triple(json[i]["position"], at + "/position");
+            else
+                wrong(at, "\"position\" is missing");
+            if (json[i].contains("title")) made.title = lineOfText(json[i]["title"], at + "/title", kLongestTitle);
+            if (json[i].contains("text")) made.text = lineOfText(json[i]["text"], at + "/text", kLongestText);
+        }
+        return all;
     }
 
     [[nodiscard]] const std::optional<Error>& error() const { return error_; }
@@ -322,6 +343,14 @@ private:
         return planes;
     }
 
+    std::string lineOfText(const Json& json, const std::string& at, size_t longest) {
+        const auto isControl = [](char c) { return uint8_t(c) < 0x20 || c == 0x7f; };
+        const std::string text = json.is_string() ? json.get<std::string>() : std::string();
+        if (!json.is_string() || text.size() > longest || std::ranges::any_of(text, isControl))
+            wrong(at, fmt::format("must be one line of text, of at most {} bytes", longest));
+        return text;
+    }
+
     const LinesOf& lines_;
     const std::string& name_;
     std::filesystem::path folder_;
@@ -381,7 +410,12 @@ bool isSceneName(const std::string& name) {
     return !isHttpUrl(name) && std::filesystem::path(name).extension() == ".json";
 }
 
-Result<SceneFile> sceneFromJson(std::string_view text, const std::string& name, const std::filesystem::path& folder) {
+namespace {
+
+/// Parses a text and has a SceneReader take it apart by `read`.
+template <class Read>
+auto readJson(std::string_view text, const std::string& name, const std::filesystem::path& folder, const Read& read)
+    -> Result<std::invoke_result_t<Read, SceneReader&, const Json&>> {
     if (auto error = notJson(text, name)) return *std::move(error);
     const Json json = Json::parse(text);
     if (isDeeperThan(json, kDeepest))
@@ -395,9 +429,19 @@ Result<SceneFile> sceneFromJson(std::string_view text, const std::string& name, 
                      .element = fmt::format("line {}", lines.twice()->second)};
     }
     SceneReader reader(lines, name, folder);
-    SceneFile scene = reader.scene(json);
+    auto made = read(reader, json);
     if (reader.error()) return *reader.error();
-    return scene;
+    return made;
+}
+
+}  // namespace
+
+Result<SceneFile> sceneFromJson(std::string_view text, const std::string& name, const std::filesystem::path& folder) {
+    return readJson(text, name, folder, [](SceneReader& reader, const Json& json) { return reader.scene(json); });
+}
+
+Result<std::vector<Annotation>> annotationsFromJson(std::string_view text, const std::string& name) {
+    return readJson(text, name, {}, [](SceneReader& reader, const Json& json) { return reader.annotations(json); });
 }
 
 Result<SceneFile> readScene(const std::filesystem::path& path) {

@@ -13,6 +13,7 @@
 
 #include "octree/io/result.h"
 #include "render/view/renderer.h"
+#include "viewer/annotation/annotations.h"
 #include "viewer/camera/orbit_camera.h"
 #include "viewer/scene/meso_scene.h"
 
@@ -36,10 +37,14 @@ struct SceneFile {
     std::optional<OrbitCamera> camera;
     std::vector<SectionPlane> sections;  ///< at most kMostSections
     bool sectionCaps = false;
+    std::vector<Annotation> annotations;  ///< at most kMostAnnotations
 };
 
 /// A scene has at most so many datasets.
 constexpr size_t kMostSceneDatasets = 256;
+/// A scene has at most so many annotations, their titles and texts at most so many bytes.
+constexpr size_t kMostAnnotations = 1000;
+constexpr size_t kLongestTitle = 200, kLongestText = 2000;
 
 /// Returns the files that a scene names: datasets and meshes without addresses, assets, bases and textures.
 std::vector<std::filesystem::path> filesOf(const SceneFile& scene);
@@ -53,6 +58,14 @@ bool isSceneName(const std::string& name);
 
 /// Relative files are taken from `folder`. `name` stands for the file in errors. May be hostile. Errors: InvalidInput.
 Result<SceneFile> sceneFromJson(std::string_view text, const std::string& name, const std::filesystem::path& folder);
+
+/// Returns the scene as sceneFromJson reads it, indented, with all that differs from what is usual. Names of files
+/// stand in it as they are in the scene; addresses lose user and password.
+std::string sceneToJson(const SceneFile& scene);
+
+/// Returns the list as a scene's "annotations" has it, and reads one. May be hostile. Errors: InvalidInput.
+std::string annotationsToJson(const std::vector<Annotation>& annotations);
+Result<std::vector<Annotation>> annotationsFromJson(std::string_view text, const std::string& name);
 
 /// Does sceneFromJson of a file of at most 1 MiB. Errors: also Io, Limit.
 Result<SceneFile> readScene(const std::filesystem::path& path);

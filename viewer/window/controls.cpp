@@ -280,7 +280,7 @@ bool sectionHead(const Look& look, const char* icon, const char* label, bool isO
     return isOpen;
 }
 
-void typedField(const Look& look, const std::string& typed, const char* hint) {
+void typedField(const Look& look, const char* icon, const std::string& typed, const char* hint) {
     const ImVec2 from = ImGui::GetCursorScreenPos();
     const float width = ImGui::GetContentRegionAvail().x, height = look.units(32);
     ImDrawList& list = *ImGui::GetWindowDrawList();
@@ -288,7 +288,7 @@ void typedField(const Look& look, const std::string& typed, const char* hint) {
     list.AddRectFilled(from, to, look.palette.control, look.units(6));
     list.AddRect(from, to, look.palette.accent, look.units(6), 0, look.units(1));
     const float top = from.y + 0.5f * (height - look.body->FontSize), left = from.x + look.units(36);
-    textIn(list, look.body, {from.x + look.units(10), top}, look.palette.dim, icon::kSearch);
+    textIn(list, look.body, {from.x + look.units(10), top}, look.palette.dim, icon);
     const std::string shown = fittedEnd(typed, width - look.units(48));
     textIn(list, look.body, {left, top}, typed.empty() ? look.palette.dim : look.palette.ink,
            typed.empty() ? hint : shown);

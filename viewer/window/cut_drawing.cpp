@@ -1,5 +1,6 @@
 #include "viewer/window/cut_drawing.h"
 
+#include <chrono>
 #include <limits>
 #include <utility>
 
@@ -10,18 +11,14 @@ namespace vcp {
 
 CutDrawing::CutDrawing(Subject subject, std::filesystem::path output)
     : subject_(std::move(subject)), output_(std::move(output)) {
-    thread_ = std::thread([this] {
-        written_ = caught([this] { return write(); }, output_.string());
-        done_ = true;
-    });
+    written_ = std::async(std::launch::async, [this] { return caught([this] { return write(); }, output_.string()); });
 }
 
-CutDrawing::~CutDrawing() {
-    cancelled_ = true;
-    thread_.join();
-}
+CutDrawing::~CutDrawing() { cancelled_ = true; }
 
-Result<SectionFigures> CutDrawing::take() { return *std::exchange(written_, std::nullopt); }
+bool CutDrawing::isDone() const { return written_.wait_for(std::chrono::seconds(0)) == std::future_status::ready; }
+
+Result<SectionFigures> CutDrawing::take() { return written_.get(); }
 
 Result<SectionFigures> CutDrawing::write() {
     VCP_TRY_ASSIGN(const auto dataset, readDataset(*subject_.reader));

@@ -4,10 +4,10 @@
 
 #include <atomic>
 #include <filesystem>
+#include <future>
 #include <memory>
 #include <optional>
 #include <string>
-#include <thread>
 
 #include "octree/io/byte_reader.h"
 #include "render/frame_request.h"
@@ -34,7 +34,7 @@ public:
 
     [[nodiscard]] const std::filesystem::path& output() const { return output_; }
     [[nodiscard]] double fraction() const { return fraction_; }
-    [[nodiscard]] bool isDone() const { return done_; }
+    [[nodiscard]] bool isDone() const;
     /// Returns what was written; call it once, when it is done. Errors: those of exportSection and readDataset;
     /// Cancelled.
     Result<SectionFigures> take();
@@ -45,9 +45,8 @@ private:
     Subject subject_;
     std::filesystem::path output_;
     std::atomic<double> fraction_ = 0;
-    std::atomic<bool> cancelled_ = false, done_ = false;
-    std::optional<Result<SectionFigures>> written_;  // belongs to the thread until done_
-    std::thread thread_;
+    std::atomic<bool> cancelled_ = false;
+    std::future<Result<SectionFigures>> written_;  // is destroyed first, which waits
 };
 
 }  // namespace vcp

@@ -51,6 +51,8 @@ void Interface::layOut(glm::ivec2 framebuffer, const Look& look) {
     layOutToasts();
     if (page_ == Page::Help) layOutHelp();
     if (page_ == Page::Files) layOutFiles();
+    if (const auto made = session_->takeNewPoint()) openPoint(*made);
+    if (page_ == Page::Point) layOutPoint();
     ImGui::PopFont();
 }
 
@@ -59,6 +61,7 @@ std::vector<Interface::Tool> Interface::tools() {
     const Viewer& viewer = session->viewer();
     const auto acts = [session](ViewerAction action) { return [session, action] { session->act(action); }; };
     const Shading& shading = viewer.shading();
+    using Clicks = ViewSession::Clicks;
     return {
         {icon::kFit, "Fit", {"Fit all into the window", "F"}, false, false, acts(ViewerAction::Fit)},
         {icon::kHome, "Reset", {"Back to the view it opened with", "R"}, false, false, acts(ViewerAction::Reset)},
@@ -66,9 +69,15 @@ std::vector<Interface::Tool> Interface::tools() {
         {icon::kMeasure,
          "Measure",
          {"Measure: click points on the surface", "D"},
-         session->isMeasuring,
+         session->clicks() == Clicks::Measure,
          true,
-         [session] { session->isMeasuring = !session->isMeasuring; }},
+         [session] { session->toggleClicks(Clicks::Measure); }},
+        {icon::kAnnotate,
+         "Annotate",
+         {"Annotate: click a point, then write", "N"},
+         session->clicks() == Clicks::Annotate,
+         true,
+         [session] { session->toggleClicks(Clicks::Annotate); }},
         {icon::kCut,
          "Cut",
          {"Cut open with a plane through the middle", "X"},
@@ -235,8 +244,12 @@ void Interface::layOutStatus() {
     // What is most important comes first: a narrow window has no room for the rest.
     std::vector<std::pair<std::string, ImU32>> parts;
     if (viewer.isFlying()) parts.emplace_back(fmt::format("Flying, speed {:.2g}", viewer.flySpeed()), palette.accent);
-    if (session_->isMeasuring)
-        parts.emplace_back(session_->isPicking() ? "Measuring\u2026" : "Click a point to measure", palette.accent);
+    if (session_->isPicking())
+        parts.emplace_back("Looking for the point\u2026", palette.accent);
+    else if (session_->clicks() == ViewSession::Clicks::Measure)
+        parts.emplace_back("Click a point to measure", palette.accent);
+    else if (session_->clicks() == ViewSession::Clicks::Annotate)
+        parts.emplace_back("Click a point to annotate", palette.accent);
     if (viewer.isOpen()) {
         parts.emplace_back(stateText(), status.detail == Detail::Budget ? palette.problem : palette.ink);
         if (status.detail == Detail::Settled && status.update.drawable)

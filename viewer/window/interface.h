@@ -44,8 +44,12 @@ public:
     void closePage() { page_ = Page::None; }
     void type(uint32_t codepoint);
     void eraseTyped();
-    /// Opens what is first in the file list.
+    /// Opens what is first in the file list; of an annotation, goes on from the title to the text, and ends there.
     void enterTyped();
+    /// Opens a page to write what an annotation says.
+    void openPoint(size_t index);
+    /// Does so for the annotation at a pixel, where there is one.
+    void openPointAt(glm::dvec2 pixel);
 
     /// Copies the camera, or, with text on the clipboard, goes to the camera it describes.
     void copyCamera();
@@ -57,7 +61,7 @@ public:
     void savePath();
 
 private:
-    enum class Page { None, Help, Files };
+    enum class Page { None, Help, Files, Point };
     struct Tool {
         const char *icon, *label;
         Tip tip;
@@ -81,6 +85,7 @@ private:
     void layOutCut();
     void layOutMeasuring();
     void layOutMeasuredLine(size_t number);
+    void layOutPoints();
     void layOutLayers();
     void layOutSave();
     void layOutDetails();
@@ -91,6 +96,10 @@ private:
     void layOutHelp();
     void layOutKeys();
     void layOutFiles();
+    void layOutPoint();
+    void layOutPointRest();
+    /// Keeps what was typed so far.
+    void writePoint();
     void layOutFolder();
     void enter(const FileList::Entry& entry);
     void layOutWelcome();
@@ -106,6 +115,7 @@ private:
     void endCard();
 
     void drawAnnotations() const;
+    [[nodiscard]] AnnotatedView annotatedView() const;
     void drawSectionHandles() const;
     void drawPages() const;
     void drawFeedback() const;
@@ -125,11 +135,13 @@ private:
     float toolbarHeight_ = 0, statusHeight_ = 0, panelWidth_ = 0;
     Page page_ = Page::None;
     std::string typed_;
+    size_t point_ = 0;         // that is written
+    bool writesText_ = false;  // and not its title
     FileList files_;
     bool showsDetails_ = false;  // opened by the status bar
     int pictureSize_ = 0;        // index in kPictureSizes
     PictureChoice picture_;
-    std::optional<bool> annotatesPictures_;  // none: where something is measured
+    std::optional<bool> annotatesPictures_;  // none: where something is measured or annotated
     int sequencePictures_ = 120;
     const bool hasEncoder_ = hasVideoEncoder();
 };

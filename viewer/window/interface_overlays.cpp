@@ -75,17 +75,28 @@ void Interface::plateAt(glm::vec2 at, const std::string& line) const {
     writeOnPlate(canvas, at, line, double(look_->scale));
 }
 
-void Interface::drawAnnotations() const {
+AnnotatedView Interface::annotatedView() const {
     const Viewer& viewer = session_->viewer();
+    return {.camera = viewer.camera().current(),
+            .viewHeight = viewer.camera().viewHeight(),
+            .size = glm::uvec2(glm::max(viewer.size(), 1)),
+            .low = {0, toolbarHeight_},
+            .high = {size_.x - panelWidth_, size_.y - statusHeight_},
+            .unit = double(look_->scale)};
+}
+
+void Interface::drawAnnotations() const {
     WindowCanvas canvas(*look_);
-    draw(session_->annotations(),
-         {.camera = viewer.camera().current(),
-          .viewHeight = viewer.camera().viewHeight(),
-          .size = glm::uvec2(glm::max(viewer.size(), 1)),
-          .low = {0, toolbarHeight_},
-          .high = {size_.x - panelWidth_, size_.y - statusHeight_},
-          .unit = double(look_->scale)},
-         canvas);
+    draw(session_->annotations(), annotatedView(), canvas);
+    if (ImGui::GetIO().WantCaptureMouse || takesText()) return;
+    const ImVec2 mouse = ImGui::GetIO().MousePos;
+    const auto under = annotationAt(session_->points(), annotatedView(), {mouse.x, mouse.y});
+    if (!under || session_->points()[*under].text.empty()) return;
+    ImGui::BeginTooltip();
+    ImGui::PushTextWrapPos(units(320));
+    text(session_->points()[*under].text);
+    ImGui::PopTextWrapPos();
+    ImGui::EndTooltip();
 }
 
 void Interface::drawSectionHandles() const {

@@ -64,7 +64,7 @@ void Interface::layOutPage(const char* title, const char* hint, float width, flo
     text(look_->strong, look_->palette.ink, title);
     ImGui::SetCursorPos({right - units(24), top});
     if (iconButton(*look_, icon::kClose, "close", {"Close", "Esc"}, false, 24)) closePage();
-    typedField(*look_, typed_, hint);
+    typedField(*look_, page_ == Page::Point ? icon::kEdit : icon::kSearch, typed_, hint);
     ImGui::BeginChild("rest", {0, 0});
     (this->*layOutRest)();
     ImGui::EndChild();
@@ -156,7 +156,56 @@ void Interface::enter(const FileList::Entry& entry) {
     host_.open({path.string()});
 }
 
+void Interface::openPoint(size_t index) {
+    page_ = Page::Point;
+    point_ = index;
+    writesText_ = false;
+    typed_ = session_->points()[index].title;
+}
+
+void Interface::openPointAt(glm::dvec2 pixel) {
+    if (!session_->viewer().isOpen()) return;
+    if (const auto under = annotationAt(session_->points(), annotatedView(), pixel)) openPoint(*under);
+}
+
+void Interface::writePoint() {
+    if (point_ >= session_->points().size()) return;
+    Annotation point = session_->points()[point_];
+    (writesText_ ? point.text : point.title) = typed_;
+    if (point != session_->points()[point_]) session_->changePoint(point_, point.title, point.text);
+}
+
+void Interface::layOutPoint() {
+    if (point_ >= session_->points().size()) return closePage();
+    while (typed_.size() > (writesText_ ? kLongestText : kLongestTitle)) eraseTyped();
+    writePoint();
+    layOutPage("Annotation", writesText_ ? "Its text, for who points at it" : "Its title, over the picture",
+               kFilesWidth, 0, &Interface::layOutPointRest);
+}
+
+void Interface::layOutPointRest() {
+    static constexpr const char* kParts[] = {"Title", "Text"};
+    int part = writesText_ ? 1 : 0;
+    if (choiceRow(*look_, "part", kParts, part, {"What is written", "Enter"})) {
+        writesText_ = part == 1;
+        typed_ = writesText_ ? session_->points()[point_].text : session_->points()[point_].title;
+    }
+    const float half = (ImGui::GetContentRegionAvail().x - units(8)) / 2;
+    if (textButton(*look_, icon::kDelete, "Remove", {"Remove the annotation", ""}, half)) {
+        session_->removePoint(point_);
+        return closePage();
+    }
+    ImGui::SameLine(0, units(8));
+    if (textButton(*look_, nullptr, "Done", {"", "Esc"}, half, true)) closePage();
+}
+
 void Interface::enterTyped() {
+    if (page_ == Page::Point && !writesText_) {
+        writesText_ = true;
+        typed_ = session_->points()[point_].text;
+        return;
+    }
+    if (page_ == Page::Point) return closePage();
     if (page_ != Page::Files) return;
     const std::vector<FileList::Entry> entries = files_.holding(typed_);
     if (!entries.empty()) enter(entries.front());

@@ -9,7 +9,7 @@
 
 #include "octree/io/content_hash.h"
 #include "render/vulkan/check.h"
-#include "viewer/window/fonts.h"
+#include "viewer/annotation/fonts.h"
 
 namespace vcp {
 

@@ -75,6 +75,7 @@ void Interface::layOutPanel() {
     section(icon::kLight, "Light", true, &Interface::layOutLight);
     section(icon::kCut, "Cut", true, &Interface::layOutCut);
     section(icon::kMeasure, "Measure", true, &Interface::layOutMeasuring);
+    section(icon::kAnnotate, "Annotate", false, &Interface::layOutPoints);
     section(icon::kLayers, "Layers", false, &Interface::layOutLayers);
     section(icon::kPicture, "Save", false, &Interface::layOutSave);
     section(icon::kDetails, "Details", false, &Interface::layOutLimits);
@@ -211,10 +212,12 @@ void Interface::layOutCut() {
 }
 
 void Interface::layOutMeasuring() {
-    switchRow(*look_, "Click measures", session_->isMeasuring, {"Click points on the surface", "D"});
+    bool measures = session_->clicks() == ViewSession::Clicks::Measure;
+    if (switchRow(*look_, "Click measures", measures, {"Click points on the surface", "D"}))
+        session_->toggleClicks(ViewSession::Clicks::Measure);
     Measurement& measured = session_->measurement();
     if (measured.empty()) {
-        if (!session_->isMeasuring) return;
+        if (!measures) return;
         ImGui::PushStyleColor(ImGuiCol_Text, look_->palette.dim);
         wrapped("Click points on the surface. Enter ends a line, Backspace takes a point back.");
         ImGui::PopStyleColor();
@@ -227,6 +230,31 @@ void Interface::layOutMeasuring() {
         session_->exportMeasurement();
     ImGui::SameLine();
     if (textButton(*look_, icon::kDelete, "Clear")) measured.clear();
+}
+
+void Interface::layOutPoints() {
+    bool annotates = session_->clicks() == ViewSession::Clicks::Annotate;
+    if (switchRow(*look_, "Click annotates", annotates, {"Click a point on the surface, then write", "N"}))
+        session_->toggleClicks(ViewSession::Clicks::Annotate);
+    const float right = ImGui::GetCursorPosX() + ImGui::GetContentRegionAvail().x;
+    std::optional<size_t> removed;
+    for (size_t i = 0; i < session_->points().size(); ++i) {
+        const Annotation& point = session_->points()[i];
+        ImGui::PushID(int(i));
+        const float room = ImGui::GetContentRegionAvail().x - units(56);
+        if (ImGui::Selectable((fitted(point.title, room) + "##go").c_str(), false, 0, {room, units(24)}))
+            session_->goToPoint(i);
+        showTip(*look_, {point.text.empty() ? "Go there" : point.text.c_str(), ""});
+        ImGui::SameLine(right - units(48));
+        if (iconButton(*look_, icon::kEdit, "edit", {"Change title and text", ""}, false, 24)) openPoint(i);
+        ImGui::SameLine(0, 0);
+        if (iconButton(*look_, icon::kDelete, "remove", {"Remove it", ""}, false, 24)) removed = i;
+        ImGui::PopID();
+    }
+    if (removed) session_->removePoint(*removed);
+    if (textButton(*look_, icon::kExport, "Save the scene",
+                   {"scene-1.json: what is shown, camera, light, cut and annotations", ""}, -1))
+        session_->saveScene();
 }
 
 void Interface::layOutMeasuredLine(size_t number) {
@@ -253,8 +281,9 @@ void Interface::layOutSave() {
     switchRow(*look_, "No background", picture_.transparent, {"What is not hit is transparent", ""});
     switchRow(*look_, "Depth as well", picture_.depth, {"Distances along the rays, as .pfm", ""});
     bool annotates = annotatesPictures();
-    if (switchRow(*look_, "Scale, measures, legend", annotates,
-                  {"Written over what is saved, as over the window; by itself where something is measured", ""}))
+    if (switchRow(
+            *look_, "Scale, measures, titles, legend", annotates,
+            {"Written over what is saved, as over the window; by itself where something is measured or annotated", ""}))
         annotatesPictures_ = annotates;
     ImGui::BeginDisabled(session_->saving().has_value());
     if (textButton(*look_, icon::kPicture, "Save the picture", {"picture-1.png in the working folder", "Ctrl+S"}, -1))
@@ -332,7 +361,9 @@ PictureChoice Interface::pictureChosen() const {
     return choice;
 }
 
-bool Interface::annotatesPictures() const { return annotatesPictures_.value_or(!session_->measurement().empty()); }
+bool Interface::annotatesPictures() const {
+    return annotatesPictures_.value_or(!session_->measurement().empty() || !session_->points().empty());
+}
 
 void Interface::savePicture() { session_->savePicture(pictureChosen()); }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -12,6 +13,7 @@
 
 #include "render/frame_setup.h"
 #include "render/host/hit_light.h"
+#include "viewer/annotation/projector.h"
 
 namespace vcp {
 
@@ -22,40 +24,30 @@ constexpr uint32_t kWhite = ~0u;
 
 }  // namespace
 
-/// Where points relative to the sample's origin are seen, and in which light.
-class MeshPreview::Projector {
+/// How a sample is seen: where its points are in the picture, and in which light. Points are relative to its origin.
+class MeshPreview::Sight {
 public:
-    struct Seen {
-        glm::vec2 pixel;
-        float depth;
-    };
-
-    Projector(const FrameRequest& request, glm::dvec3 origin)
-        : middle_(0.5f * glm::vec2(request.width, request.height)),
+    Sight(const FrameRequest& request, glm::dvec3 origin)
+        : projector_(request.camera, {request.width, request.height}),
+          origin_(origin),
           isPerspective_(request.camera.projection == Projection::Perspective),
           clay_(f32::colourOfLight(request.shading.clay)) {
         const CameraBasis basis = cameraBasis(request.camera, request.width, request.height);
         const LightDirections directions = lightDirections(request, basis);
-        right_ = basis.right;
-        up_ = basis.up;
         forward_ = basis.forward;
         eye_ = request.camera.eye - origin;
         light_ = directions.light;
         sky_ = directions.sky;
-        scale_ = float(0.5 * request.height / basis.halfHeight);
     }
 
-    [[nodiscard]] Seen see(glm::vec3 point) const {
-        const glm::vec3 to = point - eye_;
-        const float depth = glm::dot(to, forward_);
-        const float scale = isPerspective_ ? scale_ / depth : scale_;
-        return {middle_ + scale * glm::vec2(glm::dot(to, right_), -glm::dot(to, up_)), depth};
+    /// Returns the pixel of a point before the eye, unless it is so far aside that pixels lose their meaning.
+    [[nodiscard]] std::optional<glm::vec2> pixel(glm::vec3 point) const {
+        constexpr double kFarAside = 1 << 20;
+        const auto pixel = projector_.point(origin_ + glm::dvec3(point));
+        if (!pixel || std::abs(pixel->x) > kFarAside || std::abs(pixel->y) > kFarAside) return std::nullopt;
+        return glm::vec2(*pixel);
     }
-    /// Whether what is seen there is before the eye, and not so far aside that pixels lose their meaning.
-    [[nodiscard]] static bool isVisible(const Seen& seen) {
-        constexpr float kFarAside = 1 << 20;
-        return seen.depth > 0 && std::abs(seen.pixel.x) < kFarAside && std::abs(seen.pixel.y) < kFarAside;
-    }
+    [[nodiscard]] float depth(glm::vec3 point) const { return glm::dot(point - eye_, forward_); }
     /// Returns the colour that the screen shows at `point` of a plane: of the side that the eye sees. What is white is
     /// clay, as meshes without colours are.
     [[nodiscard]] ImU32 lit(uint32_t colour, glm::vec3 normal, glm::vec3 point) const {
@@ -69,21 +61,21 @@ public:
     [[nodiscard]] ImU32 litFully() const { return lit(kWhite, -forward_, eye_ + forward_); }
 
 private:
-    glm::vec3 right_, up_, forward_, eye_, light_, sky_;
-    glm::vec2 middle_;
+    Projector projector_;
+    glm::dvec3 origin_;
+    glm::vec3 forward_, eye_, light_, sky_;
     bool isPerspective_;
     glm::vec3 clay_;  // encoded for the screen
-    float scale_;     // pixels a world unit; in perspective at depth 1
 };
 
-void MeshPreview::addTriangle(const MeshSample::Triangle& t, const Projector& projector) {
+void MeshPreview::addTriangle(const MeshSample::Triangle& t, const Sight& sight) {
     const glm::vec3 across = glm::cross(t.corner[1] - t.corner[0], t.corner[2] - t.corner[0]);
     const float twice = glm::length(across);
     if (!(twice > 0)) return;
     const glm::vec3 normal = across / twice, middle = (t.corner[0] + t.corner[1] + t.corner[2]) / 3.0f;
     const bool standsForOthers = read_.trianglesEach > 1;
-    Patch patch{.depth = projector.see(middle).depth,
-                .colour = projector.lit(t.colour, normal, middle),
+    Patch patch{.depth = sight.depth(middle),
+                .colour = sight.lit(t.colour, normal, middle),
                 .corners = standsForOthers ? 4u : 3u,
                 .pixel = {}};
     std::array<glm::vec3, 4> corners{t.corner[0], t.corner[1], t.corner[2]};
@@ -94,18 +86,18 @@ void MeshPreview::addTriangle(const MeshSample::Triangle& t, const Projector& pr
         corners = {middle - u - v, middle + u - v, middle + u + v, middle - u + v};
     }
     for (uint32_t i = 0; i < patch.corners; ++i) {
-        const Projector::Seen seen = projector.see(corners[i]);
-        if (!Projector::isVisible(seen)) return;
-        patch.pixel[i] = seen.pixel;
+        const auto pixel = sight.pixel(corners[i]);
+        if (!pixel) return;
+        patch.pixel[i] = *pixel;
     }
     patches_.push_back(patch);
 }
 
-void MeshPreview::addDot(glm::vec3 vertex, float radius, uint32_t colour, const Projector& projector) {
-    const Projector::Seen seen = projector.see(vertex);
-    if (!Projector::isVisible(seen)) return;
+void MeshPreview::addDot(glm::vec3 vertex, float radius, uint32_t colour, const Sight& sight) {
+    const auto pixel = sight.pixel(vertex);
+    if (!pixel) return;
     const glm::vec2 a(radius, radius), b(radius, -radius);
-    patches_.push_back({seen.depth, colour, 4, {seen.pixel - a, seen.pixel + b, seen.pixel + a, seen.pixel - b}});
+    patches_.push_back({sight.depth(vertex), colour, 4, {*pixel - a, *pixel + b, *pixel + a, *pixel - b}});
 }
 
 bool MeshPreview::update(const MeshSample& sample, double now) {
@@ -119,12 +111,12 @@ bool MeshPreview::update(const MeshSample& sample, double now) {
 
 void MeshPreview::draw(ImDrawList& list, const FrameRequest& request, float dot) {
     if (drawnVersion_ != version_ || drawn_ != request) {
-        const Projector projector(request, read_.origin);
+        const Sight sight(request, read_.origin);
         patches_.clear();
-        const uint32_t colour = projector.litFully();
-        for (const glm::vec3& vertex : read_.vertices) addDot(vertex, 0.5f * dot, colour, projector);
+        const uint32_t colour = sight.litFully();
+        for (const glm::vec3& vertex : read_.vertices) addDot(vertex, 0.5f * dot, colour, sight);
         const auto dots = ptrdiff_t(patches_.size());
-        for (const MeshSample::Triangle& t : read_.triangles) addTriangle(t, projector);
+        for (const MeshSample::Triangle& t : read_.triangles) addTriangle(t, sight);
         std::sort(patches_.begin() + dots, patches_.end(),
                   [](const Patch& a, const Patch& b) { return a.depth > b.depth; });
         drawnVersion_ = version_;

@@ -40,11 +40,11 @@ private:
         uint32_t corners;
         std::array<glm::vec2, 4> pixel;
     };
-    class Projector;
+    class Sight;
 
     /// Adds nothing where a corner is behind the eye, or the triangle has no area.
-    void addTriangle(const MeshSample::Triangle& triangle, const Projector& projector);
-    void addDot(glm::vec3 vertex, float radius, uint32_t colour, const Projector& projector);
+    void addTriangle(const MeshSample::Triangle& triangle, const Sight& sight);
+    void addDot(glm::vec3 vertex, float radius, uint32_t colour, const Sight& sight);
 
     uint64_t version_ = 0;
     double takenAt_ = 0;

@@ -21,6 +21,7 @@
 #include "octree/io/output_file.h"
 #include "streaming/web_address.h"
 #include "viewer/camera/text_file.h"
+#include "viewer/scene/scene_file.h"
 
 namespace vcp {
 
@@ -81,6 +82,14 @@ void readBookmarks(const Json& json, UserSettings& settings) {
     }
 }
 
+void readAnnotations(const Json& json, UserSettings& settings) {
+    for (const auto& [file, points] : json.items()) {
+        if (settings.annotations.size() >= UserSettings::kMostBookmarkedFiles) continue;
+        const auto read = annotationsFromJson(points.dump(), file);
+        if (read) settings.annotations[addressWithoutUser(file)] = *read;
+    }
+}
+
 UserSettings settingsFrom(const Json& json) {
     UserSettings settings;
     const Fields fields(json);
@@ -90,6 +99,8 @@ UserSettings settingsFrom(const Json& json) {
                 settings.recent.push_back(addressWithoutUser(each.get<std::string>()));
     if (const Json* bookmarks = fields.find("bookmarks"); bookmarks && bookmarks->is_object())
         readBookmarks(*bookmarks, settings);
+    if (const Json* annotations = fields.find("annotations"); annotations && annotations->is_object())
+        readAnnotations(*annotations, settings);
     fields.number("width", settings.windowSize.x, 64, 16384);
     fields.number("height", settings.windowSize.y, 64, 16384);
     fields.flag("panel", settings.panel);
@@ -133,9 +144,21 @@ void addBookmarks(Json& json, const std::map<std::string, std::map<int, OrbitCam
     }
 }
 
+/// Puts the annotations of files in place of what was kept of them; the files that were annotated longest ago go where
+/// there are too many.
+void addAnnotations(Json& json, const std::map<std::string, std::vector<Annotation>>& annotations) {
+    if (!json.is_object()) json = Json::object();
+    for (const auto& [file, points] : annotations) {
+        json.erase(file);
+        json[file] = Json::parse(annotationsToJson(points));
+        while (json.size() > UserSettings::kMostBookmarkedFiles) json.erase(json.begin());
+    }
+}
+
 void applyChanges(const SettingsChanges& changes, Json& json) {
     if (!changes.opened.empty()) addRecent(json["recent"], changes.opened);
     if (!changes.bookmarks.empty()) addBookmarks(json["bookmarks"], changes.bookmarks);
+    if (!changes.annotations.empty()) addAnnotations(json["annotations"], changes.annotations);
     const auto put = [&](const char* name, const auto& value) {
         if (value) json[name] = *value;
     };
@@ -257,8 +280,8 @@ void UserSettings::remember(const std::string& name) {
 }
 
 bool SettingsChanges::empty() const {
-    return opened.empty() && bookmarks.empty() && !windowSize && !panel && !theme && !shadows && !occlusion && !up &&
-           !errorPixels && !budgetBytes && !backgroundTop && !backgroundBottom;
+    return opened.empty() && bookmarks.empty() && annotations.empty() && !windowSize && !panel && !theme && !shadows &&
+           !occlusion && !up && !errorPixels && !budgetBytes && !backgroundTop && !backgroundBottom;
 }
 
 Result<fs::path> userSettingsPath() {

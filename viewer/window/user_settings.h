@@ -14,6 +14,7 @@
 #include <glm/vec3.hpp>
 
 #include "octree/io/result.h"
+#include "viewer/annotation/annotations.h"
 #include "viewer/camera/orbit_camera.h"
 
 namespace vcp {
@@ -23,10 +24,11 @@ enum class ThemeChoice { System, Light, Dark };
 struct UserSettings {
     static constexpr size_t kMostRecent = 12;
     static constexpr size_t kMostBookmarks = 9;
-    static constexpr size_t kMostBookmarkedFiles = 50;
+    static constexpr size_t kMostBookmarkedFiles = 50;  ///< of annotated files as well
 
     std::vector<std::string> recent;  ///< absolute paths and addresses without passwords, the last one first
     std::map<std::string, std::map<int, OrbitCamera>> bookmarks;  ///< for each path or address; numbers 1 to 9
+    std::map<std::string, std::vector<Annotation>> annotations;   ///< for each path or address, as changed by hand
     glm::ivec2 windowSize{1280, 800};
     bool panel = false;
     ThemeChoice theme = ThemeChoice::System;
@@ -46,6 +48,7 @@ struct UserSettings {
 struct SettingsChanges {
     std::vector<std::string> opened;                              ///< remembered names, in order
     std::map<std::string, std::map<int, OrbitCamera>> bookmarks;  ///< bookmarks that were kept: UserSettings::bookmarks
+    std::map<std::string, std::vector<Annotation>> annotations;   ///< of files where they were changed, all of them
     std::optional<glm::ivec2> windowSize;
     std::optional<bool> panel, shadows, occlusion;
     std::optional<ThemeChoice> theme;

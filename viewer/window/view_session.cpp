@@ -45,6 +45,14 @@ std::string workingFolder() {
     return std::filesystem::current_path(failed).string();
 }
 
+/// Returns what is shown as a scene names it: a mesh as such, not what was built of it. What no scene can name has no
+/// name.
+SceneFile savedScene(SceneFile scene, const std::vector<std::string>& inputs) {
+    const auto kind = kindOf(inputs);
+    if (kind && *kind == InputKind::Meshes) scene.datasets.front().file = inputs.size() == 1 ? inputs.front() : "";
+    return scene;
+}
+
 }  // namespace
 
 void applyRemembered(RenderSettings& render, const UserSettings& user, const GivenSettings& given) {
@@ -167,6 +175,10 @@ Result<void> ViewSession::show(const OpenedScene& open, const std::vector<std::s
     }
     for (const MesoSurfaceDescription& surface : open.file.surfaces) layers_.push_back({nameOf({surface.base}), 0});
     shown_ = rememberedName(inputs.front());
+    scene_ = savedScene(open.file, inputs);
+    const auto kept = user_.annotations.find(shown_);
+    points_ = kept != user_.annotations.end() ? kept->second : open.file.annotations;
+    newPoint_.reset();
     for (const std::string& input : inputs) {
         changes_.opened.push_back(rememberedName(input));
         user_.remember(changes_.opened.back());
@@ -273,17 +285,21 @@ void ViewSession::pasteCamera(const std::string& json) {
     viewer_->moveTo(*camera);
 }
 
-void ViewSession::measureAt(glm::dvec2 pixel) {
-    if (!finest_ || pick_.valid()) return;
-    if (const auto hit = viewer_->hitAt(pixel); hit && hit->onSurface)
-        return note("mesostructure is not measured: it has no certified error");
+void ViewSession::clickAt(glm::dvec2 pixel) {
+    if (!finest_ || pick_.valid() || clicks_ == Clicks::Nothing) return;
+    if (const auto hit = viewer_->hitAt(pixel); hit && hit->onSurface) {
+        if (clicks_ == Clicks::Measure) return note("mesostructure is not measured: it has no certified error");
+        return annotate(hit->position);
+    }
     // A cap is the section plane itself: its points are exact.
     if (const auto cap = viewer_->capAt(pixel)) {
+        if (clicks_ == Clicks::Annotate) return annotate(*cap);
         measurement_.add({*cap, 0, viewer_->status().levels - 1});
         return;
     }
     const CameraRay through = viewer_->camera().rayThrough(pixel, viewer_->size());
     const Ray ray{through.origin, through.direction};
+    pickedFor_ = clicks_;
     pick_ = std::async(std::launch::async,
                        [finest = finest_, ray, sections = viewer_->sections()] { return finest->cast(ray, sections); });
 }
@@ -293,7 +309,56 @@ void ViewSession::takePicked() {
     const Picked picked = pick_.get();
     if (!picked) return say(picked.error().line());
     if (!*picked) return note("there is no surface under the cursor");
+    if (pickedFor_ == Clicks::Annotate) return annotate((*picked)->position);
     measurement_.add({(*picked)->position, (*picked)->certifiedError, (*picked)->level});
+}
+
+void ViewSession::annotate(glm::dvec3 position) {
+    if (points_.size() >= kMostAnnotations)
+        return note(fmt::format("there are {} annotations, as many as may be", points_.size()));
+    newPoint_ = points_.size();
+    points_.push_back({position, fmt::format("Point {}", points_.size() + 1)});
+    clicks_ = Clicks::Nothing;
+    keepPoints();
+}
+
+void ViewSession::changePoint(size_t index, std::string title, std::string text) {
+    points_.at(index).title = std::move(title);
+    points_.at(index).text = std::move(text);
+    keepPoints();
+}
+
+void ViewSession::removePoint(size_t index) {
+    points_.erase(points_.begin() + ptrdiff_t(index));
+    newPoint_.reset();
+    keepPoints();
+}
+
+/// Has what was changed by hand remembered for the file.
+void ViewSession::keepPoints() { user_.annotations[shown_] = changes_.annotations[shown_] = points_; }
+
+void ViewSession::goToPoint(size_t index) {
+    OrbitCamera camera = viewer_->camera();
+    camera.centreOn(points_.at(index).position);
+    viewer_->moveTo(camera);
+}
+
+void ViewSession::saveScene() {
+    if (!viewer_->isOpen()) return;
+    if (std::ranges::any_of(scene_.datasets, [](const SceneDataset& each) { return each.file.empty(); }))
+        return note("several meshes are shown as one: build a .vcp of them, which a scene can name");
+    SceneFile scene = scene_;
+    const Shading& shading = viewer_->shading();
+    scene.light = SceneLight{shading.lightFollowsCamera, shading.lightDirection};
+    scene.camera = viewer_->camera();
+    scene.sections = viewer_->sections();
+    scene.sectionCaps = viewer_->sectionCaps();
+    scene.annotations = points_;
+    const auto nameOf = [](int number) { return fmt::format("scene-{}.json", number); };
+    const std::string name = nameOf(freeNumber([&](int i) { return isThere(nameOf(i)); }));
+    const auto written = writeFile(name, OutputKind::JsonText, std::string_view(sceneToJson(scene)));
+    if (!written) return say(written.error().line());
+    note(fmt::format("written: {} in {}", name, workingFolder()));
 }
 
 Annotations ViewSession::annotations() const {
@@ -308,6 +373,7 @@ Annotations ViewSession::annotations() const {
         for (size_t i = 0; i + 1 < line.size(); ++i)
             annotated.lengths.push_back(lengthText(segmentLength(line, i), unit()));
     }
+    all.points = points_;
     return all;
 }
 

@@ -11,6 +11,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "viewer/annotation/annotations.h"
@@ -111,15 +112,33 @@ public:
     /// Goes to a camera in JSON, as cameraToJson writes it.
     void pasteCamera(const std::string& json);
 
-    bool isMeasuring = false;
+    /// What a click on the picture does, but for turning it.
+    enum class Clicks { Nothing, Measure, Annotate };
+    [[nodiscard]] Clicks clicks() const { return clicks_; }
+    void setClicks(Clicks clicks) { clicks_ = clicks; }
+    /// Switches it on, or off again.
+    void toggleClicks(Clicks clicks) { clicks_ = clicks_ == clicks ? Clicks::Nothing : clicks; }
+    /// Picks on the finest level, which may have to be read first, and measures or annotates there.
+    void clickAt(glm::dvec2 pixel);
+
+    /// Annotations of what is shown: of its scene file, as far as they were not changed by hand, as is remembered.
+    [[nodiscard]] const std::vector<Annotation>& points() const { return points_; }
+    void changePoint(size_t index, std::string title, std::string text);
+    void removePoint(size_t index);
+    /// Returns the point that a click has made since the last call, to be named; nothing without one.
+    std::optional<size_t> takeNewPoint() { return std::exchange(newPoint_, std::nullopt); }
+    /// Goes to where a point is seen in the middle, from the same direction and distance.
+    void goToPoint(size_t index);
+    /// Writes scene-1.json into the working folder, or the next free number: what is shown, camera, light, sections and
+    /// annotations; and reports it.
+    void saveScene();
+
     /// Overlays of streaming; nothing is asked of the renderer for them while they are off.
     bool showsPages = false;
     [[nodiscard]] bool showsFeedback() const { return showsFeedback_; }
     void showFeedback(bool show);
     [[nodiscard]] Measurement& measurement() { return measurement_; }
     [[nodiscard]] bool isPicking() const { return pick_.valid(); }
-    /// Picks on the finest level and adds the point; it may have to be read first, and then comes later.
-    void measureAt(glm::dvec2 pixel);
     /// Returns the unit of what is shown, for lengths.
     [[nodiscard]] const std::optional<LengthUnit>& unit() const { return options_.render.unit; }
     /// Returns what is written over the picture: what its colours mean, the scale bar, what is measured.
@@ -167,6 +186,8 @@ private:
     void takeOpened();
     void takePreview(double now);
     [[nodiscard]] bool isPreviewMoved() const { return framed_ && viewer_->camera().current() != *framed_; }
+    void annotate(glm::dvec3 position);
+    void keepPoints();
     Result<void> show(const OpenedScene& open, const std::vector<std::string>& inputs);
     void takePicked();
     void endPick();
@@ -193,6 +214,10 @@ private:
     std::vector<Layer> layers_;
     LegendSubject subject_;  // all that is open, in the order of Viewer::hidden()
     Measurement measurement_;
+    Clicks clicks_ = Clicks::Nothing, pickedFor_ = Clicks::Nothing;
+    SceneFile scene_;  // what is shown, as a scene that can be saved
+    std::vector<Annotation> points_;
+    std::optional<size_t> newPoint_;
     std::shared_ptr<ScenePick> finest_;
     std::future<Picked> pick_;
     struct Saving {

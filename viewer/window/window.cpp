@@ -261,13 +261,17 @@ private:
         isClick_ = plain;
         isDragging_ = true;
         session_->viewer().press(which, pixel, modifiers);
-        if (again && !session_->isMeasuring) session_->viewer().centreOn(pixel);
+        if (again && session_->clicks() == ViewSession::Clicks::Nothing) session_->viewer().centreOn(pixel);
     }
 
     void release(MouseButton which, glm::dvec2 pixel) {
         session_->viewer().release(which);
         if (!std::exchange(isDragging_, false)) return;
-        if (isClick_ && which == MouseButton::Left && session_->isMeasuring) session_->measureAt(pixel);
+        if (!isClick_ || which != MouseButton::Left) return;
+        if (session_->clicks() != ViewSession::Clicks::Nothing)
+            session_->clickAt(pixel);
+        else
+            interface_.openPointAt(pixel);
     }
 
     void scroll(double steps) {
@@ -322,7 +326,7 @@ private:
         if (key == GLFW_KEY_ESCAPE) interface_.closePage();
         if (key == GLFW_KEY_F1) interface_.toggleHelp();
         if (key == GLFW_KEY_BACKSPACE) interface_.eraseTyped();
-        if (key == GLFW_KEY_ENTER) interface_.enterTyped();
+        if (key == GLFW_KEY_ENTER || key == GLFW_KEY_TAB) interface_.enterTyped();
         if (key == GLFW_KEY_Q && (mods & GLFW_MOD_CONTROL) != 0) glfwSetWindowShouldClose(window_, GLFW_TRUE);
     }
 
@@ -349,7 +353,10 @@ private:
                 togglePanel();
                 break;
             case GLFW_KEY_D:
-                session_->isMeasuring = !session_->isMeasuring;
+                session_->toggleClicks(ViewSession::Clicks::Measure);
+                break;
+            case GLFW_KEY_N:
+                session_->toggleClicks(ViewSession::Clicks::Annotate);
                 break;
             case GLFW_KEY_ENTER:
                 session_->measurement().finishLine();
@@ -393,8 +400,8 @@ private:
             session_->cancelSaving();
         else if (session_->viewer().isFlying())
             toggleFly();
-        else if (session_->isMeasuring)
-            session_->isMeasuring = false;
+        else if (session_->clicks() != ViewSession::Clicks::Nothing)
+            session_->setClicks(ViewSession::Clicks::Nothing);
         else
             glfwSetWindowShouldClose(window_, GLFW_TRUE);
     }

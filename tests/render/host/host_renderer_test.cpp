@@ -26,13 +26,6 @@ using test::torusAndBox;
 constexpr ShadingMode kModes[] = {ShadingMode::Lit,     ShadingMode::Clay,  ShadingMode::Unlit,
                                   ShadingMode::Normals, ShadingMode::Level, ShadingMode::Error};
 
-Scene torusOfOneLevel() {
-    test::AnalyticOptions o;
-    o.levels = 1;
-    o.axis = 2;
-    return test::sceneOf("torus", test::analyticDataset(test::torus(glm::dvec3(8.2, 7.8, 8.1), 4.8, 1.8), o));
-}
-
 TEST_F(CastByRendererTest, PicturesAreTheHosts) {
     const test::BuiltMesh built = torusAndBox();
     ASSERT_TRUE(built.ok());
@@ -84,20 +77,10 @@ TEST_F(CastByRendererTest, PicksWhatTheDevicePicks) {
     for (PictureRenderer* each :
          {static_cast<PictureRenderer*>(renderer_.get()), static_cast<PictureRenderer*>(casting_.get())})
         ASSERT_TRUE(each->drawSettled(request));
-    std::array<uint64_t, 2> hits{};
-    uint64_t state = 0;
-    for (uint32_t y = 2; y < request.height; y += 5)
-        for (uint32_t x = 2; x < request.width; x += 5) {
-            const auto device = renderer_->pick(x, y).value(), cast = casting_->pick(x, y).value();
-            state += device.has_value() != cast.has_value() ? 1 : 0;
-            if (!device || !cast) continue;
-            ASSERT_EQ(cast->dataset, device->dataset);
-            EXPECT_LT(glm::distance(cast->position, device->position), 1e-3);
-            ++hits[cast->dataset];
-        }
-    EXPECT_LE(state, 1u);
-    EXPECT_GT(hits[0], 20u);
-    EXPECT_GT(hits[1], 5u);
+    const test::PickDifference picks = test::comparePicks(*casting_, *renderer_, request);
+    EXPECT_LE(picks.differing, 1u);
+    EXPECT_GT(picks.ofDataset[0], 20u);
+    EXPECT_GT(picks.ofDataset[1], 5u);
     EXPECT_FALSE(casting_->pick(request.width, 0).value());
 }
 
@@ -129,8 +112,7 @@ TEST_F(CastByRendererTest, CancellingEndsAFrame) {
 }
 
 TEST_F(HostRendererTest, EveryKindOfLeafFromEveryCamera) {
-    for (const Scene& scene : {test::sphereScene(1), torusOfOneLevel(), test::cubeScene(1), test::wavesScene(12, 2),
-                               test::sphereScene(1, {483920.0, 3792000.0, 1200.0}, 1.0 / 1024)}) {
+    for (const Scene& scene : test::scenesOfEveryLeaf()) {
         SCOPED_TRACE(scene.name);
         open(scene);
         Difference all;

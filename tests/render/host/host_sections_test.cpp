@@ -38,13 +38,18 @@ std::vector<std::vector<SectionPlane>> cuts(glm::dvec3 lo, glm::dvec3 hi) {
              plane({0, 0.84, 0}, {0, -1, 0}), plane({0, 0, 0.317}, {0, 0, 1}), plane({0, 0, 0.7}, {0.1, 0, -1})}};
 }
 
+FrameRequest cutRequest(const NamedCamera& named, const std::vector<SectionPlane>& sections, bool caps,
+                        ShadingMode mode = ShadingMode::Lit, double errorPixels = 0.2) {
+    FrameRequest request = requestOf(named.camera);
+    request.shading.mode = mode;
+    request.errorPixels = errorPixels;
+    request.sections = sections;
+    request.sectionCaps = caps;
+    return request;
+}
+
 TEST_F(HostSections, EveryKindOfLeafFromEveryCamera) {
-    test::AnalyticOptions oneLevel;
-    oneLevel.levels = 1;
-    const auto torus = test::torus(glm::dvec3(8.2, 7.8, 8.1), 4.8, 1.8);
-    const Scene scenes[] = {test::sphereScene(1), test::sceneOf("torus", test::analyticDataset(torus, oneLevel)),
-                            test::cubeScene(1), test::wavesScene(12, 2),
-                            test::sphereScene(1, {483920.0, 3792000.0, 1200.0}, 1.0 / 1024)};
+    const auto scenes = test::scenesOfEveryLeaf();
     for (const bool caps : {false, true}) {
         Difference all;
         for (const Scene& scene : scenes) {
@@ -53,10 +58,8 @@ TEST_F(HostSections, EveryKindOfLeafFromEveryCamera) {
             const auto cameras = test::cameras(scene);
             for (size_t i = 0; i < cameras.size(); ++i) {
                 SCOPED_TRACE(scene.name + std::string(", ") + cameras[i].name);
-                FrameRequest request = requestOf(cameras[i].camera);
-                request.sections = sections[i % sections.size()];
-                request.sectionCaps = caps;
-                all += difference(request, scene.dataset->header.cell);
+                all +=
+                    difference(cutRequest(cameras[i], sections[i % sections.size()], caps), scene.dataset->header.cell);
             }
         }
         expectFew(all);
@@ -74,14 +77,10 @@ TEST_F(HostSections, ABuiltMeshInEveryCutAndSeveralLevels) {
         for (const bool caps : {false, true}) {
             SCOPED_TRACE(errorPixels);
             Difference all;
-            for (size_t i = 0; i < cameras.size() * 2; ++i) {
-                FrameRequest request = requestOf(cameras[i % cameras.size()].camera);
-                request.errorPixels = errorPixels;
-                request.shading.mode = kModes[i % std::size(kModes)];
-                request.sections = sections[i % sections.size()];
-                request.sectionCaps = caps;
-                all += difference(request, built.cache().dataset().header.cell);
-            }
+            for (size_t i = 0; i < cameras.size() * 2; ++i)
+                all += difference(cutRequest(cameras[i % cameras.size()], sections[i % sections.size()], caps,
+                                             kModes[i % std::size(kModes)], errorPixels),
+                                  built.cache().dataset().header.cell);
             expectFew(all);
         }
 }
@@ -92,14 +91,9 @@ TEST_F(HostSections, FalseColoursOfWhatIsBehindACap) {
     open(built);
     Difference all;
     for (const NamedCamera& named : test::cameras(kLow, kHigh))
-        for (const ShadingMode mode : {ShadingMode::Level, ShadingMode::Error}) {
-            FrameRequest request = requestOf(named.camera);
-            request.shading.mode = mode;
-            request.errorPixels = 4;
-            request.sections = cuts(kLow, kHigh)[0];
-            request.sectionCaps = true;
-            all += difference(request, built.cache().dataset().header.cell);
-        }
+        for (const ShadingMode mode : {ShadingMode::Level, ShadingMode::Error})
+            all +=
+                difference(cutRequest(named, cuts(kLow, kHigh)[0], true, mode, 4), built.cache().dataset().header.cell);
     expectFew(all);
 }
 
@@ -160,20 +154,10 @@ TEST_F(HostSections, PicksSayWhetherTheyAreOnACap) {
     request.sectionCaps = true;
     ASSERT_TRUE(renderer_->drawSettled(request));
     ASSERT_TRUE(casting_->drawSettled(request));
-    uint64_t caps = 0, others = 0, differing = 0;
-    for (uint32_t y = 2; y < request.height; y += 5)
-        for (uint32_t x = 2; x < request.width; x += 5) {
-            const auto device = renderer_->pick(x, y).value(), cast = casting_->pick(x, y).value();
-            if (!device || !cast || device->onCap != cast->onCap) {
-                differing += device || cast ? 1 : 0;
-                continue;
-            }
-            EXPECT_LT(glm::distance(cast->position, device->position), 1e-3);
-            ++(cast->onCap ? caps : others);
-        }
-    EXPECT_LE(differing, 1u);
-    EXPECT_GT(caps, 30u);
-    EXPECT_GT(others, 30u);
+    const test::PickDifference picks = test::comparePicks(*casting_, *renderer_, request);
+    EXPECT_LE(picks.differing, 1u);
+    EXPECT_GT(picks.caps, 30u);
+    EXPECT_GT(picks.ofDataset[0], picks.caps + 30u);
 }
 
 // A ball cut open: each pixel of the disc is cap, and none about it; without caps, its far wall is seen.

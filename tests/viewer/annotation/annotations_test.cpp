@@ -75,6 +75,33 @@ TEST(Annotations, TheScaleBarIsAsLongAsItSays) {
     }
 }
 
+TEST(Annotations, PointsAreMarkedAndTitled) {
+    const AnnotatedView view = flat(0.01);
+    Annotations annotations;
+    annotations.points = {{{1, 2, 0}, "Nose"}, {{6.3, 0, 0}, "At the right edge"}, {{100, 0, 0}, "Outside"}, {{-2, 0, 0}, ""}};
+    const RecordingCanvas canvas = drawn(annotations, view);
+    const glm::dvec2 nose(640 + 100, 400 - 200), edge(640 + 630, 400);
+    ASSERT_EQ(canvas.discs.size(), 6u) << "two for each point that is seen";
+    EXPECT_LT(glm::distance(canvas.discs[0], nose), 1e-6);
+    ASSERT_EQ(canvas.texts.size(), 2u);
+    EXPECT_EQ(canvas.texts[0].text, "Nose");
+    EXPECT_GT(canvas.texts[0].at.x, nose.x);
+    EXPECT_LT(canvas.texts[1].at.x + 6 * 17, edge.x) << "what has no room at the right stands at the left";
+    EXPECT_EQ(annotationAt(annotations.points, view, nose + 3.0), 0u);
+    EXPECT_EQ(annotationAt(annotations.points, view, edge), 1u);
+    EXPECT_FALSE(annotationAt(annotations.points, view, {400, 100}));
+}
+
+TEST(Annotations, NoTitleCoversAnother) {
+    Annotations annotations;
+    for (int i = 0; i < 50; ++i) annotations.points.push_back({{0.02 * i, 0, 0}, "Point " + std::to_string(i)});
+    const RecordingCanvas canvas = drawn(annotations, flat(0.01));
+    EXPECT_EQ(canvas.discs.size(), 100u);
+    EXPECT_GE(canvas.texts.size(), 2u);
+    for (size_t i = 0; i + 1 < canvas.texts.size(); ++i)
+        EXPECT_GT(canvas.texts[i + 1].at.x, canvas.texts[i].at.x + 6 * double(canvas.texts[i].text.size()));
+}
+
 TEST(Annotations, TheScaleBarHasTheUnitAndSaysWhereItHolds) {
     AnnotatedView view = flat(10);
     const Annotations annotations{.legends = {}, .hasScaleBar = true, .lines = {}, .unit = unitNamed("mm")};

@@ -2,7 +2,6 @@
 #include "builder/measure/mesh_deviation.h"
 #include "tests/support/mesh_reading.h"
 #include "tests/viewer/export/exported_mesh.h"
-#include "viewer/annotation/stroke_text.h"
 #include "viewer/export/deviation_picture.h"
 #include "viewer/export/diverging_colours.h"
 #include "viewer/export/surface_mesh.h"
@@ -144,16 +143,6 @@ TEST(DeviationPicture, ShowsTheSurfaceInItsColours) {
         }
     EXPECT_TRUE(hasBlue);
     EXPECT_TRUE(hasInk);
-}
-
-TEST(StrokeText, HasEveryLetterOfTheScale) {
-    for (const char letter : std::string("0123456789+-.%()/:abcdefghijklmnopqrstuvwxyz")) {
-        Picture picture{20, 20, std::vector<uint8_t>(1600, 255)};
-        drawText(picture, std::string(1, letter), {4, 14}, 9, {0, 0, 0});
-        size_t dark = 0;
-        for (size_t i = 0; i < 400; ++i) dark += picture.rgba[4 * i] < 128;
-        EXPECT_GT(dark, 0u) << letter;
-    }
 }
 
 TEST(DeviationMesh, HasDistancesAndColours) {

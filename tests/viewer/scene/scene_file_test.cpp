@@ -108,6 +108,95 @@ TEST(SceneFile, WhatIsWrongIsSaidWithItsLine) {
 
 // What is wrong only with the file or the asset that a scene names is the scene's fault too, not that of who typed its
 // name.
+void expectNear(glm::dvec3 a, glm::dvec3 b) { EXPECT_LT(glm::distance(a, b), 1e-12 * (1 + glm::length(b))); }
+
+// A scene that was written is read as it was: everything that differs from what is usual, names as they are.
+TEST(SceneFile, WhatIsWrittenIsReadAgain) {
+    SceneFile scene;
+    scene.datasets.push_back({.file = "/scans/statue.vcp", .placement = {}});
+    scene.datasets.push_back(
+        {.file = "http://127.0.0.1:1/a.vcp",
+         .placement = {glm::angleAxis(0.7, glm::normalize(glm::dvec3(1, 2, -0.5))), 0.125, {483920.25, -3, 1e-9}}});
+    MesoSurfaceDescription& surface = scene.surfaces.emplace_back();
+    surface.asset = "beads";
+    surface.base = "torus";
+    surface.tiles = 3;
+    surface.subdivide = 2;
+    surface.heightScale = 0.5;
+    surface.place = {1, 2, 3};
+    surface.up = UpAxis::Y;
+    surface.colour = {0.25f, 0.5f, 1};
+    surface.method.name = "ddm";
+    surface.method.cells = 32;
+    surface.method.cones = {2, 2};
+    surface.method.steps = 7;
+    surface.withBase = surface.withFar = false;
+    scene.light = SceneLight{.followsCamera = true, .direction = glm::vec3(0.6f, 0, 0.8f)};
+    scene.camera = OrbitCamera();
+    scene.camera->position = {1, 2, 30};
+    scene.sections = {{{0, 0, -2}, -0.25}, {{1, 0.5, 0}, 7}};
+    scene.sectionCaps = true;
+    scene.annotations = {{{0.1, -2e5, 3}, "Nose, \"chipped\"", "Repaired in 1904: \u00fcbermalt"}, {{1, 1, 1}, ""}};
+
+    const std::string text = sceneToJson(scene);
+    const auto read = sceneFromJson(text, "scene.json", "/elsewhere");
+    ASSERT_TRUE(read) << read.error().line() << "\n" << text;
+    ASSERT_EQ(read->datasets.size(), 2u);
+    for (size_t i = 0; i < 2; ++i) {
+        EXPECT_EQ(read->datasets[i].file, scene.datasets[i].file);
+        const Similarity &a = read->datasets[i].placement, &b = scene.datasets[i].placement;
+        EXPECT_EQ(a.scale, b.scale);
+        EXPECT_EQ(a.translation, b.translation);
+        for (const glm::dvec3 axis : {glm::dvec3(1, 0, 0), glm::dvec3(0, 1, 0)})
+            expectNear(a.rotation * axis, b.rotation * axis);
+    }
+    ASSERT_EQ(read->surfaces.size(), 1u);
+    EXPECT_EQ(read->surfaces[0].asset, "beads");
+    EXPECT_EQ(read->surfaces[0].base, "torus");
+    EXPECT_EQ(read->surfaces[0].tiles, 3);
+    EXPECT_EQ(read->surfaces[0].subdivide, 2);
+    EXPECT_EQ(read->surfaces[0].heightScale, 0.5);
+    EXPECT_EQ(read->surfaces[0].place, surface.place);
+    EXPECT_EQ(read->surfaces[0].up, UpAxis::Y);
+    EXPECT_EQ(read->surfaces[0].colour, surface.colour);
+    EXPECT_EQ(read->surfaces[0].method.name, "ddm");
+    EXPECT_EQ(read->surfaces[0].method.cells, 32);
+    EXPECT_EQ(read->surfaces[0].method.cones.count(), 4);
+    EXPECT_EQ(read->surfaces[0].method.steps, 7);
+    EXPECT_FALSE(read->surfaces[0].withBase || read->surfaces[0].withFar);
+    ASSERT_TRUE(read->light && read->camera);
+    EXPECT_TRUE(read->light->followsCamera);
+    EXPECT_LT(glm::distance(read->light->direction, scene.light->direction), 1e-6f);
+    expectNear(read->camera->position, scene.camera->position);
+    EXPECT_EQ(read->sections, scene.sections);
+    EXPECT_TRUE(read->sectionCaps);
+    EXPECT_EQ(read->annotations, scene.annotations);
+    EXPECT_EQ(sceneToJson(*sceneFromJson(sceneToJson(*read), "scene.json", "")), sceneToJson(*read));
+}
+
+TEST(SceneFile, AddressesAreWrittenWithoutPasswords) {
+    SceneFile scene;
+    scene.datasets.push_back({.file = "https://ada:secret@example.org/a.vcp", .placement = {}});
+    const std::string text = sceneToJson(scene);
+    EXPECT_EQ(text.find("secret"), std::string::npos) << text;
+    EXPECT_NE(text.find("https://example.org/a.vcp"), std::string::npos) << text;
+}
+
+TEST(SceneFile, AnnotationsAreLinesOfText) {
+    const auto errorOf = [](const std::string& annotation) {
+        const auto read = annotationsFromJson("[" + annotation + "]", "notes");
+        return read ? std::string() : read.error().line();
+    };
+    EXPECT_EQ(errorOf(R"({"position": [1, 2, 3], "title": "a"})"), "");
+    EXPECT_NE(errorOf(R"({"title": "a"})").find("\"position\" is missing"), std::string::npos);
+    EXPECT_NE(errorOf(R"({"position": [1, 2, 3], "titel": "a"})").find("is no key here"), std::string::npos);
+    EXPECT_NE(errorOf(R"({"position": [1, 2, 3], "title": "a\u001b[2J"})").find("one line of text"), std::string::npos);
+    EXPECT_NE(errorOf("{\"position\": [1, 2, 3], \"text\": \"" + std::string(kLongestText + 1, 'x') + "\"}")
+                  .find("one line of text"),
+              std::string::npos);
+    EXPECT_NE(annotationsFromJson("{}", "notes").error().line().find("must be a list"), std::string::npos);
+}
+
 TEST(SceneFile, WhatItNamesIsBlamedOnIt) {
     const auto refusal = [](const std::string& text) {
         auto scene = sceneFromJson(text, "museum.json", {});

@@ -120,7 +120,7 @@ TEST(Typeset, NumbersKeepTheirUnitsAndDigitsTogether) {
 
 /// The fonts as the build embeds them have every icon of the list, and the signs that typeset() makes.
 TEST(Fonts, HaveWhatIsDrawn) {
-    const std::string folder = std::string(VCP_SOURCE_DIR) + "/viewer/window/fonts/";
+    const std::string folder = std::string(VCP_SOURCE_DIR) + "/viewer/annotation/fonts/";
     const auto fontOf = [&](ImFontAtlas& atlas, const char* file) {
         static constexpr ImWchar kAll[] = {0x20, 0xffff, 0};
         return atlas.AddFontFromFileTTF((folder + file).c_str(), 8, nullptr, kAll);
@@ -128,7 +128,7 @@ TEST(Fonts, HaveWhatIsDrawn) {
     ImFontAtlas icons;
     const ImFont* const icon = fontOf(icons, "icons.ttf");
     ASSERT_TRUE(icon && icons.Build());
-    const std::string list = contentOf(folder + "../icons.h");
+    const std::string list = contentOf(std::string(VCP_SOURCE_DIR) + "/viewer/window/icons.h");
     const std::regex code("U\\+(F[0-9A-F]{3})");
     size_t found = 0;
     for (auto at = std::sregex_iterator(list.begin(), list.end(), code); at != std::sregex_iterator(); ++at, ++found)

@@ -57,6 +57,7 @@ TEST_F(UserSettingsTest, ComeBackAsTheyWere) {
     camera.position = {1, 2, 3};
     camera.focusDistance = 4;
     settings.bookmarks["/tmp/b.ply"][3] = camera;
+    settings.annotations["/tmp/b.ply"] = {{{1, 2, 0.1}, "Nose", "Broken"}};
     const auto path = folder_ / "new" / "folder" / "view.json";
     ASSERT_EQ(save(settings, path), "");
     const auto read = readUserSettings(path);
@@ -73,6 +74,7 @@ TEST_F(UserSettingsTest, ComeBackAsTheyWere) {
     EXPECT_EQ(read->backgroundTop, settings.backgroundTop);
     EXPECT_EQ(read->backgroundBottom, settings.backgroundBottom);
     ASSERT_EQ(read->bookmarks.size(), 1u);
+    EXPECT_EQ(read->annotations, settings.annotations);
     EXPECT_EQ(read->bookmarks.at("/tmp/b.ply").at(3).position, camera.position);
     EXPECT_EQ(filesIn(path.parent_path()), std::set<std::string>{"view.json"});
 }
@@ -88,7 +90,8 @@ TEST_F(UserSettingsTest, WhatIsWrongIsLeftOut) {
     write(
         R"({"recent":[1,"a",null,"b"],"width":"wide","height":1e99,"panel":3,"theme":"pink","up":7,"error_pixels":-1,"budget_bytes":1e300,
               "background_top":[0,0],"background_bottom":[0,2,0],"shadows":true,
-              "bookmarks":{"x":{"1":{"position":[0,0,0]},"2":5,"99":{}},"y":3}})");
+              "bookmarks":{"x":{"1":{"position":[0,0,0]},"2":5,"99":{}},"y":3},
+              "annotations":{"x":[{"position":[0,0]}],"y":3,"z":[{"title":"a"}]}})");
     const auto read = readUserSettings(file_);
     ASSERT_TRUE(read) << read.error().line();
     const UserSettings defaults;
@@ -102,6 +105,7 @@ TEST_F(UserSettingsTest, WhatIsWrongIsLeftOut) {
     EXPECT_EQ(read->theme, defaults.theme);
     EXPECT_TRUE(read->shadows);
     EXPECT_TRUE(read->bookmarks.empty());
+    EXPECT_TRUE(read->annotations.empty());
 }
 
 TEST_F(UserSettingsTest, NoJsonIsSaid) {

@@ -11,6 +11,7 @@
 #include <thread>
 
 #include <gtest/gtest.h>
+#include <glm/geometric.hpp>
 
 #include "octree/dataset_reader.h"
 #include "render/picture.h"
@@ -259,6 +260,40 @@ TEST_F(RememberingSessionTest, TheBackgroundGoesWithTheThemeUntilOneIsChosen) {
     EXPECT_EQ(third.session->viewer().shading().backgroundTop, glm::vec3(1, 0, 0));
 }
 
+// Annotations belong to the file: what was changed by hand is there again, in place of what its scene file says.
+TEST_F(RememberingSessionTest, AnnotationsAreThereAgain) {
+    Remembering first = begin();
+    first.open(ball());
+    first.session->setClicks(ViewSession::Clicks::Annotate);
+    first.session->clickAt({48, 32});
+    std::optional<size_t> made;
+    for (int i = 0; i < 1000 && !made; ++i) {
+        first.turn();
+        made = first.session->takeNewPoint();
+        std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+    ASSERT_EQ(made, 0u);
+    EXPECT_EQ(first.session->clicks(), ViewSession::Clicks::Nothing) << "one click, one annotation";
+    EXPECT_NEAR(glm::length(first.session->points()[0].position), 1, 0.01) << "on the ball";
+    first.session->changePoint(0, "Here", "Is something");
+    end(first);
+
+    Remembering second = begin();
+    second.open(ball());
+    ASSERT_EQ(second.session->points().size(), 1u);
+    EXPECT_EQ(second.session->points()[0].title, "Here");
+    EXPECT_EQ(second.session->points()[0].text, "Is something");
+    EXPECT_EQ(second.session->annotations().points, second.session->points());
+    second.open(copyOfBall("other.vcp"));
+    EXPECT_TRUE(second.session->points().empty());
+    second.open(ball());
+    second.session->removePoint(0);
+    end(second);
+    Remembering third = begin();
+    third.open(ball());
+    EXPECT_TRUE(third.session->points().empty());
+}
+
 TEST_F(RememberingSessionTest, ANoteGoesByItself) {
     Remembering window = begin();
     window.open(ball());
@@ -496,6 +531,29 @@ TEST_F(ViewSessionTest, DepthAndTransparencyAreChosen) {
     ASSERT_TRUE(isSaved());
     EXPECT_EQ(filesIn("turntable-1"),
               (std::set<std::string>{"depth-0001.pfm", "depth-0002.pfm", "picture-0001.png", "picture-0002.png"}));
+}
+
+// A scene that was saved shows what was shown: camera, cut, light and annotations.
+TEST_F(ViewSessionTest, ASceneIsSavedAndOpenedAgain) {
+    const OrbitCamera camera = session_->viewer().camera();
+    session_->viewer().setSections({{{0, 0, 1}, 0.25}});
+    session_->setClicks(ViewSession::Clicks::Annotate);
+    session_->clickAt({48, 32});
+    ASSERT_TRUE(turnUntil([&] { return !session_->points().empty() || !session_->note().empty(); }));
+    ASSERT_EQ(session_->points().size(), 1u) << session_->note();
+    session_->changePoint(0, "Pole", "");
+    const Annotation kept = session_->points()[0];
+    session_->saveScene();
+    ASSERT_TRUE(session_->problem().empty()) << session_->problem();
+    session_->saveScene();
+    EXPECT_TRUE(fs::exists("scene-2.json")) << "the next free number";
+    session_->viewer().act(ViewerAction::ViewTop);
+    session_->open({"scene-1.json"});
+    ASSERT_TRUE(turnUntil([&] { return !session_->opening(); }));
+    ASSERT_TRUE(session_->problem().empty()) << session_->problem();
+    EXPECT_EQ(session_->points(), std::vector<Annotation>{kept});
+    EXPECT_EQ(session_->viewer().sections(), (std::vector<SectionPlane>{{{0, 0, 1}, 0.25}}));
+    EXPECT_LT(glm::distance(session_->viewer().camera().position, camera.position), 1e-9);
 }
 
 // In two tiles across and several rows of them, and in each picture of a turntable where the camera has it.

@@ -1,4 +1,4 @@
-#include "viewer/command/terminal_text.h"
+#include "viewer/command/terminal/terminal_text.h"
 
 #include <cstdint>
 

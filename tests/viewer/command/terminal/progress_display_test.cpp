@@ -1,4 +1,4 @@
-#include "viewer/command/progress_display.h"
+#include "viewer/command/terminal/progress_display.h"
 
 #include <cstdio>
 #include <sstream>

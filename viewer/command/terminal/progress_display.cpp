@@ -1,4 +1,4 @@
-#include "viewer/command/progress_display.h"
+#include "viewer/command/terminal/progress_display.h"
 
 #include <algorithm>
 #include <cmath>
@@ -8,7 +8,7 @@
 #include <unistd.h>
 #include <nlohmann/json.hpp>
 
-#include "viewer/command/terminal_text.h"
+#include "viewer/command/terminal/terminal_text.h"
 #include "viewer/scene/option_values.h"
 
 namespace vcp {

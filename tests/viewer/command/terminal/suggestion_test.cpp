@@ -1,4 +1,4 @@
-#include "viewer/command/suggestion.h"
+#include "viewer/command/terminal/suggestion.h"
 
 #include <gtest/gtest.h>
 

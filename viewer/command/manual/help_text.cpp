@@ -1,4 +1,4 @@
-#include "viewer/command/help_text.h"
+#include "viewer/command/manual/help_text.h"
 
 #include <algorithm>
 #include <string_view>

@@ -1,4 +1,4 @@
-// Text in pictures: letters of strokes, drawn smoothly at any size.
+// Text, lines and rectangles in pictures, drawn smoothly at any size. Text is in the window's typeface.
 #pragma once
 
 #include <string_view>
@@ -10,11 +10,12 @@
 
 namespace vcp {
 
-/// How wide text is at a height of its capitals, in pixels. All letters are of one width.
+/// How wide a line of text is at a height of its capitals, in pixels.
 double textWidth(std::string_view text, double height);
 
-/// Draws text. `at`: the lower left corner of its first letter, in pixels from the picture's upper left corner, y
-/// downwards; `height`: of its capitals. Letters: a to z, digits, and + - . , % ( ) / : what else comes is left blank.
+/// Draws a line of text. `text`: UTF-8, Latin letters, digits and the signs of units; what else comes is an empty box.
+/// `at`: where its first letter stands on the line, in pixels from the picture's upper left corner, y downwards;
+/// `height`: of its capitals. Any thread.
 void drawText(Picture& picture, std::string_view text, glm::dvec2 at, double height, glm::dvec3 srgb);
 
 /// Draws a straight line, `width` pixels wide.

@@ -1,5 +1,5 @@
 // What reaches a terminal: shown as it is, or spelled out.
-#include "viewer/command/terminal_text.h"
+#include "viewer/command/terminal/terminal_text.h"
 
 #include <random>
 

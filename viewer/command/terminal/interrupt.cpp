@@ -1,4 +1,4 @@
-#include "viewer/command/interrupt.h"
+#include "viewer/command/terminal/interrupt.h"
 
 #include <atomic>
 

@@ -1,12 +1,12 @@
 #!/usr/bin/python3
-"""Makes the window's fonts: subsets of Inter and of Material Design Icons, as Debian 12 packs them.
+"""Makes the fonts of window and pictures: subsets of Inter and of Material Design Icons, as Debian 12 packs them.
 
     apt-get install fonts-inter fonts-materialdesignicons-webfont python3-fonttools
     ./make_fonts.py
 
 Writes inter_regular.otf, inter_semibold.otf and icons.ttf beside itself, the same bytes each time. Inter keeps Latin
 letters, digits and the signs that the window's texts use. Dear ImGui knows no OpenType features: so that columns of
-numbers stand still, digits and the signs around them become their tabular forms here. icons.h, a folder above, lists
+numbers stand still, digits and the signs around them become their tabular forms here. viewer/window/icons.h lists
 the icons; a test compares the two.
 """
 
@@ -56,7 +56,7 @@ def write(source, name, codes, makes_tabular):
     print(name, (HERE / name).stat().st_size, "bytes,", len(font.getBestCmap()), "characters")
 
 
-icons = [int(code, 16) for code in re.findall(r"U\+(F[0-9A-F]{3})", (HERE.parent / "icons.h").read_text())]
+icons = [int(code, 16) for code in re.findall(r"U\+(F[0-9A-F]{3})", (HERE.parents[1] / "window" / "icons.h").read_text())]
 write(INTER / "Inter-Regular.otf", "inter_regular.otf", TEXT, True)
 write(INTER / "Inter-SemiBold.otf", "inter_semibold.otf", TEXT, True)
 write(ICONS, "icons.ttf", icons, False)

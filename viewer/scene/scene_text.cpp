@@ -1,0 +1,110 @@
+// Writes scene files (scene_file.h).
+#include <numbers>
+
+#include <glm/gtc/quaternion.hpp>
+#include <nlohmann/json.hpp>
+
+#include "streaming/web_address.h"
+#include "viewer/scene/scene_file.h"
+
+namespace vcp {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json triple(glm::dvec3 v) { return Json::array({v.x, v.y, v.z}); }
+
+Json datasetJson(const SceneDataset& dataset) {
+    const Similarity& placement = dataset.placement;
+    Json json{{"file", isHttpUrl(dataset.file) ? addressWithoutUser(dataset.file) : dataset.file}};
+    if (placement.translation != glm::dvec3(0)) json["translate"] = triple(placement.translation);
+    if (const double angle = glm::angle(placement.rotation); angle != 0)
+        json["rotate"] = {{"axis", triple(glm::axis(placement.rotation))}, {"degrees", angle * 180 / std::numbers::pi}};
+    if (placement.scale != 1) json["scale"] = placement.scale;
+    return json;
+}
+
+Json surfaceJson(const MesoSurfaceDescription& surface) {
+    const MesoSurfaceDescription usual;
+    Json json{{"asset", surface.asset}};
+    const auto put = [&](const char* key, const auto& value, const auto& unwritten) {
+        if (value != unwritten) json[key] = value;
+    };
+    put("surface", surface.base, usual.base);
+    put("subdivide", surface.subdivide, usual.subdivide);
+    put("tiles", surface.tiles, usual.tiles);
+    put("height", surface.heightScale, usual.heightScale);
+    if (surface.place != usual.place) json["translate"] = triple(surface.place);
+    put("scale", surface.scale, usual.scale);
+    if (surface.up != usual.up) json["up"] = "y";
+    if (surface.colour != usual.colour)
+        json["colour"] = Json::array({surface.colour.r, surface.colour.g, surface.colour.b});
+    put("texture", surface.colourTexture, usual.colourTexture);
+    put("normal_texture", surface.normalTexture, usual.normalTexture);
+    json["method"] = surface.method.name;
+    put("grid", surface.method.cells, usual.method.cells);
+    const meso::Cones cones = surface.method.cones, usualCones = usual.method.cones;
+    if (cones.azimuth != usualCones.azimuth || cones.elevation != usualCones.elevation)
+        json["cones"] = Json::array({cones.azimuth, cones.elevation});
+    put("steps", surface.method.steps, usual.method.steps);
+    put("base", surface.withBase, usual.withBase);
+    put("far", surface.withFar, usual.withFar);
+    return json;
+}
+
+Json annotationJson(const Annotation& annotation) {
+    Json json{{"position", triple(annotation.position)}};
+    if (!annotation.title.empty()) json["title"] = annotation.title;
+    if (!annotation.text.empty()) json["text"] = annotation.text;
+    return json;
+}
+
+/// Names of files need not be UTF-8; JSON must.
+std::string dumped(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
+
+/// Makes a text of the keys, each with what it has in a line of its own.
+class SceneText {
+public:
+    void add(const char* key, const Json& value) {
+        text_ += (text_.empty() ? "  \"" : ",\n  \"") + std::string(key) + "\": " + dumped(value);
+    }
+    template <class Items, class ToJson>
+    void addList(const char* key, const Items& items, const ToJson& toJson) {
+        if (items.empty()) return;
+        std::string list;
+        for (const auto& item : items) list += (list.empty() ? "\n    " : ",\n    ") + dumped(toJson(item));
+        text_ += (text_.empty() ? "  \"" : ",\n  \"") + std::string(key) + "\": [" + list + "\n  ]";
+    }
+    [[nodiscard]] std::string take() const { return "{\n" + text_ + "\n}\n"; }
+
+private:
+    std::string text_;
+};
+
+}  // namespace
+
+std::string annotationsToJson(const std::vector<Annotation>& annotations) {
+    Json list = Json::array();
+    for (const Annotation& each : annotations) list.push_back(annotationJson(each));
+    return dumped(list);
+}
+
+std::string sceneToJson(const SceneFile& scene) {
+    SceneText text;
+    text.addList("datasets", scene.datasets, datasetJson);
+    text.addList("mesostructure", scene.surfaces, surfaceJson);
+    if (scene.light) {
+        const Json light{{"direction", triple(scene.light->direction)}, {"follows_camera", scene.light->followsCamera}};
+        text.add("lights", Json::array({light}));
+    }
+    if (scene.camera) text.add("camera", Json::parse(cameraToJson(*scene.camera)));
+    text.addList("sections", scene.sections, [](const SectionPlane& plane) {
+        return Json{{"normal", triple(plane.normal)}, {"offset", plane.offset}};
+    });
+    if (scene.sectionCaps) text.add("caps", true);
+    text.addList("annotations", scene.annotations, annotationJson);
+    return text.take();
+}
+
+}  // namespace vcp
