@@ -19,6 +19,7 @@ namespace fs = std::filesystem;
 
 constexpr ImGuiWindowFlags kCard = ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoCollapse |
                                    ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoTitleBar;
+constexpr float kPointHeight = 184;
 constexpr float kHelpWidth = 880, kHelpHeight = 800, kTwoColumns = 640, kKeysWidth = 152;
 constexpr float kFilesWidth = 560, kFilesHeight = 520;
 constexpr float kWelcomeWidth = 640, kRecentWidth = 136, kRecentHeight = 85;
@@ -180,7 +181,7 @@ void Interface::layOutPoint() {
     while (typed_.size() > (writesText_ ? kLongestText : kLongestTitle)) eraseTyped();
     writePoint();
     layOutPage("Annotation", writesText_ ? "Its text, for who points at it" : "Its title, over the picture",
-               kFilesWidth, 0, &Interface::layOutPointRest);
+               kFilesWidth, kPointHeight, &Interface::layOutPointRest);
 }
 
 void Interface::layOutPointRest() {
@@ -196,7 +197,7 @@ void Interface::layOutPointRest() {
         return closePage();
     }
     ImGui::SameLine(0, units(8));
-    if (textButton(*look_, nullptr, "Done", {"", "Esc"}, half, true)) closePage();
+    if (textButton(*look_, nullptr, "Done", {"", "Esc"}, half)) closePage();
 }
 
 void Interface::enterTyped() {

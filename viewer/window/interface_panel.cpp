@@ -241,10 +241,12 @@ void Interface::layOutPoints() {
     for (size_t i = 0; i < session_->points().size(); ++i) {
         const Annotation& point = session_->points()[i];
         ImGui::PushID(int(i));
-        const float room = ImGui::GetContentRegionAvail().x - units(56);
-        if (ImGui::Selectable((fitted(point.title, room) + "##go").c_str(), false, 0, {room, units(24)}))
-            session_->goToPoint(i);
+        const float left = ImGui::GetCursorPosX(), room = right - left - units(56);
+        if (ImGui::Selectable("##go", false, 0, {room, units(24)})) session_->goToPoint(i);
         showTip(*look_, {point.text.empty() ? "Go there" : point.text.c_str(), ""});
+        ImGui::SameLine(left);
+        ImGui::AlignTextToFramePadding();
+        text(fitted(point.title, room));
         ImGui::SameLine(right - units(48));
         if (iconButton(*look_, icon::kEdit, "edit", {"Change title and text", ""}, false, 24)) openPoint(i);
         ImGui::SameLine(0, 0);
