@@ -4,6 +4,7 @@
 #include <bit>
 #include <cmath>
 #include <functional>
+#include <set>
 
 #include <glm/common.hpp>
 #include <glm/exponential.hpp>
@@ -231,6 +232,9 @@ uint64_t numberOfRays(const FrameRequest& request) {
     if (!hasLight(shading)) return number;
     add(shading.shadows), add(shading.occlusionRays), add(shading.occlusionRadius);
     add(shading.lightFollowsCamera), addPoint(shading.lightDirection);
+    // What is hidden is in no ray's way.
+    const std::set<uint32_t> hidden(request.hidden.begin(), request.hidden.end());
+    for (const uint32_t dataset : hidden) add(dataset);
     return number;
 }
 

@@ -3,11 +3,14 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <optional>
 
 #include <fmt/format.h>
 
 #include "octree/surface/morton.h"
 #include "render/frame_setup.h"
+#include "render/host/lit_layers.h"
+#include "render/residencies.h"
 
 namespace vcp {
 
@@ -103,30 +106,74 @@ RayFeedback feedbackOf(const HostLayer& layer, const Dataset& dataset, const Hos
     return feedback;
 }
 
-Result<void> drawDataset(const HostDataset& drawn, const FrameRequest& request, const HostCastOptions& options,
-                         HostPicture& picture) {
-    Residency& residency = drawn.residency;
-    const FrameRequest seen = requestIn(drawn.placement, request);
-    const Dataset& dataset = residency.dataset();
-    const PlacedCut cut = placedCut(residency, drawn.view);
-    VCP_TRY_ASSIGN(const auto scene, HostScene::create(hostGrid(dataset.header), cut.pages));
-    const bool hasColour = residency.hasColour();
-    const bool isFirst = request.sample == 0, asked = isFirst && residency.asksRays(drawn.view);
-    PictureMarks marks(scene.pages());
-    const HostLayer layer{.scene = scene,
-                          .rays = raysOf(seen),
-                          .frame = frameConstants(seen, &dataset, 1, hasColour, drawn.errorPixels, drawn.placement),
-                          .hasColour = hasColour,
-                          .caps = request.sectionCaps,
-                          .worldPerUnit = drawn.placement.scale,
-                          .number = drawn.number,
-                          .marks = asked ? &marks : nullptr};
-    VCP_TRY(drawLayer(layer, options, picture));
-    if (asked)
-        residency.see({markedPages(dataset, scene, marks.byCamera), markedPages(dataset, scene, marks.byLight)},
-                      selectionView(seen), residency.cutNumber(drawn.view), drawn.view);
-    if (isFirst && residency.listens()) residency.hear(feedbackOf(layer, dataset, picture), selectionView(seen));
+/// A dataset's layer of a picture, and what the layer points to.
+struct PlacedLayer {
+    const HostDataset& drawn;
+    FrameRequest seen;  // from the dataset's own space
+    PlacedCut cut;
+    std::optional<HostScene> scene;
+    std::optional<PictureMarks> marks;  // where the dataset is asked which pages rays hit
+};
+
+/// Fills what a layer is made of.
+Result<void> place(PlacedLayer& layer, const FrameRequest& request) {
+    Residency& residency = layer.drawn.residency;
+    layer.seen = requestIn(layer.drawn.placement, request);
+    layer.cut = placedCut(residency, layer.drawn.view);
+    VCP_TRY_ASSIGN(layer.scene, HostScene::create(hostGrid(residency.dataset().header), layer.cut.pages));
+    if (request.sample == 0 && residency.asksRays(layer.drawn.view)) layer.marks.emplace(layer.scene->pages());
     return {};
+}
+
+HostLayer layerOf(PlacedLayer& placed, const FrameRequest& request) {
+    const HostDataset& drawn = placed.drawn;
+    const Dataset& dataset = drawn.residency.dataset();
+    const bool hasColour = drawn.residency.hasColour();
+    return {.scene = *placed.scene,
+            .rays = raysOf(placed.seen),
+            .frame = frameConstants(placed.seen, &dataset, 1, hasColour, drawn.errorPixels, drawn.placement),
+            .hasColour = hasColour,
+            .caps = request.sectionCaps,
+            .worldPerUnit = drawn.placement.scale,
+            .number = drawn.number,
+            .marks = placed.marks ? &*placed.marks : nullptr};
+}
+
+/// Draws layers; where they shade each other, all at once.
+Result<void> drawLayers(std::span<HostLayer> layers, std::span<const HostDataset> datasets, const FrameRequest& request,
+                        const HostCastOptions& options, HostPicture& picture) {
+    if (layers.size() < 2 || !hasLight(request.shading)) {
+        for (const HostLayer& layer : layers) VCP_TRY(drawLayer(layer, options, picture));
+        return {};
+    }
+    if (request.shading.occlusionRadius <= 0) {
+        std::vector<PictureDataset> all;
+        for (const HostDataset& each : datasets) all.push_back({each.residency.dataset(), each.placement});
+        const double radius = occlusionRadiusAmong(all);
+        for (HostLayer& layer : layers) layer.frame.occlusionReach = float(radius / double(layer.frame.worldPerCell));
+    }
+    return drawLitLayers(layers, options, picture);
+}
+
+/// Tells the residencies what the rays of a first sample hit.
+void tell(std::span<const PlacedLayer> placed, std::span<const HostLayer> layers, const HostPicture& picture) {
+    std::vector<SeenPages> seen;
+    for (size_t i = 0; i < placed.size(); ++i) {
+        const PlacedLayer& layer = placed[i];
+        Residency& residency = layer.drawn.residency;
+        const ViewNumber view = layer.drawn.view;
+        const auto marked = [&](const PageMarks& marks) {
+            return markedPages(residency.dataset(), *layer.scene, marks);
+        };
+        if (layer.marks)
+            seen.push_back({&residency,
+                            {marked(layer.marks->byCamera), marked(layer.marks->byLight)},
+                            selectionView(layer.seen),
+                            residency.cutNumber(view)});
+        if (residency.listens())
+            residency.hear(feedbackOf(layers[i], residency.dataset(), picture), selectionView(layer.seen));
+    }
+    if (!placed.empty()) seeAll(std::move(seen), placed.front().drawn.view);
 }
 
 }  // namespace
@@ -155,7 +202,15 @@ Result<HostPicture> drawOnHost(std::span<const HostDataset> datasets, const Fram
                                const std::function<bool()>& cancel) {
     const HostCastOptions options{.cancel = cancel};
     HostPicture picture({int(request.width), int(request.height)}, backgroundRows(request));
-    for (const HostDataset& each : datasets) VCP_TRY(drawDataset(each, request, options, picture));
+    std::vector<PlacedLayer> placed;
+    for (const HostDataset& each : datasets) placed.push_back({each, {}, {}, {}, {}});
+    std::vector<HostLayer> layers;
+    for (PlacedLayer& each : placed) {
+        VCP_TRY(place(each, request));
+        layers.push_back(layerOf(each, request));
+    }
+    VCP_TRY(drawLayers(layers, datasets, request, options, picture));
+    if (request.sample == 0) tell(placed, layers, picture);
     return picture;
 }
 

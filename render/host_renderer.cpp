@@ -49,17 +49,11 @@ Result<void> HostRenderer::setSurfaces(std::span<const MesoSurface> surfaces) {
 Result<UpdateResult> HostRenderer::update(const FrameRequest& request) {
     VCP_TRY(checkRequest(request));
     VCP_TRY(checkHostDraws(request));
-    std::optional<UpdateResult> all;
-    for (size_t i = 0; i < datasets_.size(); ++i) {
-        if (isHidden(request, i)) continue;
-        const auto& [residency, placement] = datasets_[i];
-        VCP_TRY_ASSIGN(auto one, residency->update(selectionView(requestIn(placement, request))));
-        errorPixels_[i] = one.errorPixels;
-        if (all)
-            add(*all, one);
-        else
-            all = std::move(one);
-    }
+    std::vector<ShownResidency> shown;
+    for (size_t i = 0; i < datasets_.size(); ++i)
+        if (!isHidden(request, i))
+            shown.push_back({datasets_[i].residency.get(), datasets_[i].placement, &errorPixels_[i]});
+    VCP_TRY_ASSIGN(auto all, updateShown(shown, request));
     if (!all)
         return UpdateResult{
             .settled = true, .drawable = !datasets_.empty(), .errorPixels = std::numeric_limits<double>::infinity()};

@@ -1,8 +1,13 @@
 #include "render/residencies.h"
 
 #include <algorithm>
+#include <limits>
 
 #include <fmt/format.h>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+
+#include "render/frame_setup.h"
 
 namespace vcp {
 
@@ -67,6 +72,56 @@ void waitForPage(std::span<const PlacedResidency> datasets, std::chrono::millise
     for (const PlacedResidency& placed : datasets) {
         if (std::chrono::steady_clock::now() >= until) return;
         if (placed.residency->waitForPage(std::min(timeout, kTurn))) return;
+    }
+}
+
+double occlusionRadiusAmong(std::span<const PictureDataset> shown) {
+    constexpr double kPart = 0.1, kFar = std::numeric_limits<double>::infinity();
+    glm::dvec3 lo(kFar), hi(-kFar);
+    for (const auto& [dataset, placement] : shown) {
+        const FileHeader& header = dataset.header;
+        const glm::dvec3 corners[2] = {{header.boundsMin[0], header.boundsMin[1], header.boundsMin[2]},
+                                       {header.boundsMax[0], header.boundsMax[1], header.boundsMax[2]}};
+        for (int i = 0; i < 8; ++i) {
+            const glm::dvec3 corner = placement.toWorld({corners[i & 1].x, corners[i >> 1 & 1].y, corners[i >> 2].z});
+            lo = glm::min(lo, corner), hi = glm::max(hi, corner);
+        }
+    }
+    return kPart * glm::distance(lo, hi);
+}
+
+Result<std::optional<UpdateResult>> updateShown(std::span<const ShownResidency> shown, const FrameRequest& request,
+                                                ViewNumber number) {
+    std::vector<UpdateResult> results;
+    uint64_t cuts = 0;
+    for (const ShownResidency& each : shown) {
+        VCP_TRY_ASSIGN(auto one, each.residency->update(selectionView(requestIn(each.placement, request)), number));
+        *each.errorPixels = one.errorPixels;
+        results.push_back(std::move(one));
+        cuts = (cuts + each.residency->cutNumber(number)) * 0x9e3779b97f4a7c15;
+    }
+    std::optional<UpdateResult> all;
+    for (size_t i = 0; i < shown.size(); ++i) {
+        UpdateResult& one = results[i];
+        if (shown.size() > 1 && hasLight(request.shading)) {
+            shown[i].residency->surroundWith(cuts, number);
+            one.awaitsRays = one.awaitsRays || (one.settled && shown[i].residency->asksRays(number));
+            one.settled = one.settled && !one.awaitsRays;
+        }
+        if (all)
+            add(*all, one);
+        else
+            all = std::move(one);
+    }
+    return all;
+}
+
+void seeAll(std::vector<SeenPages> seen, ViewNumber number) {
+    const bool isFinal = std::all_of(seen.begin(), seen.end(),
+                                     [](const SeenPages& each) { return each.residency->hasAll(each.hit.byCamera); });
+    for (SeenPages& each : seen) {
+        if (!isFinal) each.hit.byLight.clear();
+        each.residency->see(each.hit, each.view, each.cutNumber, number);
     }
 }
 

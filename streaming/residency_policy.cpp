@@ -182,15 +182,18 @@ void ResidencyPolicy::see(const PagesHit& hit, const SelectionView& view, ViewNu
     const auto known = motions_.find(number);
     if (!asksRays_ || known == motions_.end()) return;
     // Rays of light begin where the camera's rays hit: as long as those ask for finer pages, it is not known where.
-    const bool isFinal = std::all_of(hit.byCamera.begin(), hit.byCamera.end(),
-                                     [&](uint64_t page) { return isResident(page) || states_[page] == kUnavailable; });
     std::vector<uint64_t> pages = hit.byCamera;
-    if (isFinal) pages.insert(pages.end(), hit.byLight.begin(), hit.byLight.end());
+    if (hasAll(hit.byCamera)) pages.insert(pages.end(), hit.byLight.begin(), hit.byLight.end());
     Motion& motion = known->second;
     if (motion.view != view)
         motion.seen.guess(*dataset_, pages);
     else if (motion.seen.add(*dataset_, pages))
         stale_ = true;
+}
+
+bool ResidencyPolicy::hasAll(const std::vector<uint64_t>& pages) const {
+    return std::all_of(pages.begin(), pages.end(),
+                       [&](uint64_t page) { return isResident(page) || states_[page] == kUnavailable; });
 }
 
 PageChoice ResidencyPolicy::chosenFor(std::span<const SelectionView> views) const {

@@ -114,6 +114,8 @@ public:
     /// Takes in which pages the rays of a frame hit, and where they began: a frame of `view`, which is what that view
     /// saw at its last look() or before. What it asks for is wanted from the next look() on.
     void see(const PagesHit& hit, const SelectionView& view, ViewNumber number = 0);
+    /// Whether pages that rays ask for are there, or cannot be read: what rays hit is then known for good.
+    [[nodiscard]] bool hasAll(const std::vector<uint64_t>& pages) const;
     Placement place(uint64_t page);
     /// Returns what the view can draw and what to read. Precondition: hasLooked(number).
     [[nodiscard]] PolicyOutcome finish(ViewNumber number = 0) const;

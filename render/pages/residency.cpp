@@ -145,6 +145,11 @@ void Residency::see(const PagesHit& hit, const SelectionView& view, uint64_t cut
         cut->second.answered = cutNumber;
 }
 
+void Residency::surroundWith(uint64_t others, ViewNumber number) {
+    ViewCut& cut = current(number);
+    if (std::exchange(cut.others, others) != others) cut.answered = 0;
+}
+
 Result<UpdateResult> Residency::update(const SelectionView& view, ViewNumber number) {
     std::vector<Loaded> loaded = loader_->collect(uploadBytes());
     for (const Loaded& page : loaded) {

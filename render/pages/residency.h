@@ -67,6 +67,12 @@ public:
     }
     /// Takes in which pages a frame of `view` hit that drew the cut of that number.
     void see(const PagesHit& hit, const SelectionView& view, uint64_t cutNumber, ViewNumber number = 0);
+    /// Says what else throws rays of light in the view: any number that differs when that does. The next frame is then
+    /// to say anew which pages its rays hit.
+    void surroundWith(uint64_t others, ViewNumber number = 0);
+    [[nodiscard]] uint64_t others(ViewNumber number = 0) { return current(number).others; }
+    /// Whether pages that rays ask for are there, or cannot be read.
+    [[nodiscard]] bool hasAll(const std::vector<uint64_t>& pages) const { return policy_->hasAll(pages); }
 
     /// Waits until the loader has a page, or the time is over.
     bool waitForPage(std::chrono::milliseconds timeout) { return loader_->waitForPage(timeout); }
@@ -111,6 +117,7 @@ private:
         uint64_t version = UINT64_MAX;
         uint64_t number = 0, reported = 0;  // of the cut, and of that of its last update
         uint64_t answered = 0;              // of the cut of which a frame of this view said what its rays hit
+        uint64_t others = 0;                // as surroundWith() said
         uint64_t pagesUnseen = 0;
         SelectionView view;
     };

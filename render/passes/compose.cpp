@@ -7,7 +7,12 @@
 
 namespace vcp {
 
-Result<void> ComposeTarget::resize(Device& device, PictureSize size) {
+Result<void> ComposeTarget::resize(Device& device, PictureSize size, bool lit) {
+    if (lit && (size != size_ || light_.bytes() == 0)) {
+        VCP_TRY_ASSIGN(light_, device.createBuffer(size.pixels() * 4 * frame::kScenePlanes,
+                                                   VK_BUFFER_USAGE_STORAGE_BUFFER_BIT, MemoryUse::Local));
+    }
+    if (!lit) light_ = {};
     if (size == size_) return {};
     VCP_TRY_ASSIGN(auto depths,
                    device.createBuffer((size.pixels() + 1) * 4,
@@ -43,10 +48,10 @@ uint32_t ComposeTarget::hitPixels() const {
 
 ComposePass::ComposePass() : pipelines_(kComposeSpirv) {}
 
-Result<void> ComposePass::prepare(FrameResources& resources, const PassConstants& constants) {
+Result<void> ComposePass::prepare(FrameResources& resources, const PassConstants& constants, bool gathers) {
     PassConstants plain = constants;
     plain.colour = plain.countSteps = plain.falseColour = false;
-    return pipelines_.choose(resources, plain);
+    return pipelines_.choose(resources, plain, {gathers ? 1u : 0u});
 }
 
 void ComposePass::record(VkCommandBuffer commands, const FrameResources& resources) const {

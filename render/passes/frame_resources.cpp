@@ -42,6 +42,7 @@ constexpr Binding kBindings[] = {
     {kStorage, 1},
     {kStorage, 1},
     {kStorage, 1},
+    {kStorage, 1},
 };
 constexpr uint32_t kBindingCount = std::size(kBindings);
 
@@ -84,6 +85,9 @@ Result<void> FrameResources::createLayout() {
     VkPipelineLayoutCreateInfo layout{VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO};
     layout.setLayoutCount = 1;
     layout.pSetLayouts = &setLayout_;
+    const VkPushConstantRange ray{VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof(frame::SceneRay)};
+    layout.pushConstantRangeCount = 1;
+    layout.pPushConstantRanges = &ray;
     VCP_VK(vkCreatePipelineLayout, device_.handle(), &layout, nullptr, &layout_);
     VkDescriptorPoolCreateInfo pool{VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO};
     pool.maxSets = 1;
@@ -180,14 +184,15 @@ void FrameResources::setFeedback(const Buffer* feedback) {
     setStale_ = true;
 }
 
-void FrameResources::setTarget(const Buffer* picture, const Buffer* depths) {
-    const VkBuffer handles[2] = {picture != nullptr ? picture->handle() : VK_NULL_HANDLE,
-                                 depths != nullptr ? depths->handle() : VK_NULL_HANDLE};
-    if (handles[0] == targetHandles_[0] && handles[1] == targetHandles_[1]) return;
+void FrameResources::setTarget(const Buffer* picture, const Buffer* depths, const Buffer* light) {
+    std::array<VkBuffer, 3> handles{};
+    const Buffer* const buffers[] = {picture, depths, light};
+    for (size_t i = 0; i < handles.size(); ++i)
+        if (buffers[i] != nullptr) handles[i] = buffers[i]->handle();
     targetPicture_ = picture;
     targetDepths_ = depths;
-    std::copy(handles, handles + 2, targetHandles_);
-    setStale_ = true;
+    targetLight_ = light;
+    if (std::exchange(targetHandles_, handles) != handles) setStale_ = true;
 }
 
 void FrameResources::setSums(const Buffer& sums, const Buffer& shown) {
@@ -230,6 +235,7 @@ void FrameResources::writeSet() {
     useBuffer(17, 0, targetDepths_ != nullptr ? *targetDepths_ : none_.buffer);
     useBuffer(18, 0, sums_ != nullptr ? *sums_ : none_.buffer);
     useBuffer(19, 0, shown_ != nullptr ? *shown_ : none_.buffer);
+    useBuffer(20, 0, targetLight_ != nullptr ? *targetLight_ : none_.buffer);
 
     VkWriteDescriptorSet writes[kBindingCount];
     for (uint32_t i = 0; i < kBindingCount; ++i) {
@@ -266,9 +272,17 @@ void FrameResources::bind(VkCommandBuffer commands) const {
 }
 
 void FrameResources::dispatchTiles(VkCommandBuffer commands, TileRange tiles) const {
-    const uint32_t row = tiles.first / frame::kTileRow, column = tiles.first % frame::kTileRow;
     if (tiles.count == 0)
         vkCmdDispatchIndirect(commands, tileList().handle(), 0);
+    else
+        dispatchAnyTiles(commands, tiles);
+}
+
+void FrameResources::dispatchAnyTiles(VkCommandBuffer commands, TileRange tiles) const {
+    const uint32_t row = tiles.first / frame::kTileRow, column = tiles.first % frame::kTileRow;
+    const uint32_t all = size_.tilesX() * size_.tilesY();
+    if (tiles.count == 0)
+        vkCmdDispatch(commands, frame::kTileRow, (all + frame::kTileRow - 1) / frame::kTileRow, 1);
     else if (tiles.count < frame::kTileRow)
         vkCmdDispatchBase(commands, column, row, 0, tiles.count, 1, 1);
     else

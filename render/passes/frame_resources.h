@@ -15,8 +15,11 @@
 //           datasets (passes/compose.h)
 // 18, 19    sums of samples, and picture   accumulate        accumulate, readback, present
 //           of their mean
+// 20        normals, lifts and light of   compose,           scene light, shade
+//           all datasets                  scene light
 #pragma once
 
+#include <array>
 #include <initializer_list>
 #include <map>
 #include <memory>
@@ -113,8 +116,9 @@ public:
     /// Sets the feedback buffer: not null as long as frames with the feedback pass are drawn.
     void setFeedback(const Buffer* feedback);
 
-    /// Sets what the pictures of several datasets are composed into, or null.
-    void setTarget(const Buffer* picture, const Buffer* depths);
+    /// Sets what the pictures of several datasets are composed into, or null. `light`: null where datasets do not shade
+    /// each other.
+    void setTarget(const Buffer* picture, const Buffer* depths, const Buffer* light);
 
     /// Sets what the picture of the next frame is added to (passes/accumulate.h).
     void setSums(const Buffer& sums, const Buffer& shown);
@@ -126,6 +130,8 @@ public:
     void bind(VkCommandBuffer commands) const;
     /// Dispatches a workgroup for each listed tile of the range; beyond the list there is nothing.
     void dispatchTiles(VkCommandBuffer commands, TileRange tiles) const;
+    /// Dispatches a workgroup for each tile of the range, of all in the picture; beyond them are some more.
+    void dispatchAnyTiles(VkCommandBuffer commands, TileRange tiles) const;
 
     /// Records the copy of what a frame counted, and of the hit at `cursor`, to where counts() reads it. Comes after
     /// the last pass's barrierComputeToReadback; ends with barrierTransferToHost. Precondition: `cursor` is in the
@@ -174,7 +180,8 @@ private:
     VkBuffer feedbackHandle_ = VK_NULL_HANDLE;  // as of the last call
     const Buffer* targetPicture_ = nullptr;
     const Buffer* targetDepths_ = nullptr;
-    VkBuffer targetHandles_[2] = {VK_NULL_HANDLE, VK_NULL_HANDLE};  // as of the last call
+    const Buffer* targetLight_ = nullptr;
+    std::array<VkBuffer, 3> targetHandles_{};  // as of the last call
     const Buffer* sums_ = nullptr;
     const Buffer* shown_ = nullptr;
     bool setStale_ = true;

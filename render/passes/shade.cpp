@@ -6,10 +6,10 @@ namespace vcp {
 
 ShadePass::ShadePass() : pipelines_(kShadeSpirv) {}
 
-Result<void> ShadePass::prepare(FrameResources& resources, const PassConstants& constants, bool light) {
+Result<void> ShadePass::prepare(FrameResources& resources, const PassConstants& constants, ShadeLight light) {
     PassConstants plain = constants;
     plain.countSteps = false;
-    return pipelines_.choose(resources, plain, {light ? 1u : 0u});
+    return pipelines_.choose(resources, plain, {uint32_t(light)});
 }
 
 void ShadePass::record(VkCommandBuffer commands, const FrameResources& resources) const {

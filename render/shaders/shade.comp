@@ -1,13 +1,16 @@
 // Colours the hit pixels from their records. Reads tile list, tile starts and hits; writes those pixels of the picture,
-// which holds the background before.
+// which holds the background before. Where datasets shade each other, reads the light of all, and writes the pixels of
+// the picture of all in which this dataset is nearest.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #include "render/shaders/bindings.glsl"
 #include "render/shaders/tiles.glsl"
 #include "render/shaders/hit_records.glsl"
 #include "render/shared/hit_light.h"
+#include "render/shaders/scene_light.glsl"
 
-layout(constant_id = 6) const uint kLight = 0u;  // 1: the hits have a plane of light
+// 0: none; 1: the hits have a plane of light; 2: the picture of several datasets has.
+layout(constant_id = 6) const uint kLight = 0u;
 layout(local_size_x = 8, local_size_y = 8) in;
 
 // Returns how much sky is seen, averaged over the pixels around that show the same surface: light.comp gives each pixel
@@ -22,6 +25,20 @@ float skyAbout(uvec2 pixel, float depth, uint plane) {
         bool traced = fetchTileStart(uint(p.y) / kTileSize * frame.tilesX + uint(p.x) / kTileSize) < kTileEmpty;
         bool same = traced && abs(fetchPixelHit(at).depth - depth) <= reach;
         sum += same ? unpackUnorm4x8(fetchHit(frame.lightPlane * plane + at)).y : 0.0;
+        count += same ? 1.0 : 0.0;
+    }
+    return sum / max(count, 1.0);
+}
+
+// Returns the same in a picture of several datasets.
+float sceneSkyAbout(uvec2 pixel, float depth) {
+    float reach = 8.0 * pixelEdgeAt(depth / frame.worldPerCell) * frame.worldPerCell;
+    float sum = 0.0, count = 0.0;
+    for (int i = 0; i < 16; i++) {
+        ivec2 p = clamp(ivec2(pixel) + ivec2((i & 3) - 1, (i >> 2) - 1), ivec2(0), ivec2(pictureSize()) - 1);
+        uint at = uint(p.y) * frame.width + uint(p.x);
+        bool same = abs(sceneDepth(at) - depth) <= reach;
+        sum += same ? unpackUnorm4x8(sceneLight[sceneAt(kSceneLight, at)]).y : 0.0;
         count += same ? 1.0 : 0.0;
     }
     return sum / max(count, 1.0);
@@ -48,13 +65,21 @@ void main() {
     if (kColour != 0u && coloured) albedo = unpackUnorm4x8(fetchHit(2u * plane + at)).xyz;
     if (hit.onCap) albedo = frame.cap.xyz;
     float sunSeen = 1.0, skySeen = 1.0;
-    if (kLight != 0u) {
+    if (kLight == 1u) {
         sunSeen = unpackUnorm4x8(fetchHit(frame.lightPlane * plane + at)).x;
         if (frame.occlusionRays > 0u) skySeen = skyAbout(pixel, depth, plane);
+    }
+    if (kLight == 2u) {
+        if (depth * frame.worldPerCell != sceneDepth(at)) return;
+        if (frame.hasShadows != 0u) sunSeen = unpackUnorm4x8(sceneLight[sceneAt(kSceneLight, at)]).x;
+        if (frame.occlusionRays > 0u) skySeen = sceneSkyAbout(pixel, sceneDepth(at));
     }
     vec3 colour = frame.shadingMode == kShadeNormals ? turnedBy(frame.rotation.xyz, frame.rotation.w, n) * 0.5 + 0.5
                   : frame.shadingMode == kShadeUnlit
                       ? albedo
                       : albedo * encodedLight(n, frame.lightDirection.xyz, frame.upDirection.xyz, sunSeen, skySeen);
-    picturePixels[at] = packUnorm4x8(vec4(colour, 1.0));
+    if (kLight == 2u)
+        targetPixels[at] = packUnorm4x8(vec4(colour, 1.0));
+    else
+        picturePixels[at] = packUnorm4x8(vec4(colour, 1.0));
 }

@@ -18,6 +18,17 @@ uint stripedIndex(uint i, uint count) {
     return i < run * stripes ? (i - stripe * run) * stripes + stripe : i;
 }
 
+// Finds the invocation's pixel among those of all tiles; false where there is none.
+bool anyPixel(out uvec2 pixel) {
+    uint index = gl_WorkGroupID.y * kTileRow + gl_WorkGroupID.x;
+    uint count = frame.tilesX * frame.tilesY;
+    pixel = uvec2(0u);
+    if (index >= count) return false;
+    uint tile = stripedIndex(index, count), row = quotient(tile, frame.tilesX);
+    pixel = uvec2(tile - row * frame.tilesX, row) * kTileSize + pixelInTile();
+    return all(lessThan(pixel, pictureSize()));
+}
+
 // Finds the invocation's tile of the list and its pixel; false where there is none.
 bool listedPixel(out uint tile, out uvec2 pixel) {
     uint index = gl_WorkGroupID.y * kTileRow + gl_WorkGroupID.x;

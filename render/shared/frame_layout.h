@@ -123,6 +123,24 @@ const uint kHitByLight = 1u;
 const float kNearnessOne = 65536.0f;
 const float kNearnessEps = 0.015625f;  // edges of the root page
 
+// A ray of light through one of several datasets (scene_light.comp).
+struct SceneRay {
+    uint number;           // of the rays into the sky; kSunRay
+    uint isFirst, isLast;  // 1: of the datasets that the ray goes through
+    uint unused;
+};
+const uint kSunRay = 0xffffffffu;
+
+// Planes of a picture of several datasets that shade each other, words: the packed normal in the world's axes
+// (hit_records.glsl), by how many world units rays of light begin above the hit (float bits), light (8 bits sun, 8 bits
+// sky; before the last ray into the sky the sum of what these see, float bits), and where the ray that is being cast
+// was stopped (float bits; world units).
+const uint kSceneNormal = 0u;
+const uint kSceneLift = 1u;
+const uint kSceneLight = 2u;
+const uint kSceneNear = 3u;
+const uint kScenePlanes = 4u;
+
 struct FrameCounters {
     uint hitPixels;
     uint tracedTiles;

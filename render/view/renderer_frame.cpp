@@ -102,6 +102,7 @@ Result<void> Renderer::View::prepare(Frame& frame, size_t i) {
     drawing.listened = layer.listens() && !frame.part;
     drawing.asked = layer.asksRays(number) && !frame.part;
     drawing.cutNumber = layer.residency != nullptr ? layer.residency->cutNumber(number) : 0;
+    drawing.others = layer.residency != nullptr ? layer.residency->others(number) : 0;
     drawing.constants = constantsFor(layer, drawing.request);
     const FrameRequest& request = drawing.request;
     const PassConstants& constants = drawing.constants;
@@ -111,8 +112,8 @@ Result<void> Renderer::View::prepare(Frame& frame, size_t i) {
     resources.setBackground(backgroundRows(request));
     VCP_TRY(prepareTable(layer, drawing));
     if (shared->composes()) {
-        VCP_TRY(frame.target.resize(*shared->device, resources.size()));
-        resources.setTarget(&frame.layers.front().resources->picture(), &frame.target.depths());
+        VCP_TRY(frame.target.resize(*shared->device, resources.size(), frame.isLit));
+        resources.setTarget(&frame.layers.front().resources->picture(), &frame.target.depths(), frame.target.light());
     }
     if (drawing.reports()) VCP_TRY(drawing.feedback.prepare(*shared->device, resources, layer.table));
     return choosePipelines(frame, i);
@@ -124,7 +125,7 @@ Result<void> Renderer::View::choosePipelines(Frame& frame, size_t i) {
     const FrameRequest& request = drawing.request;
     const PassConstants& constants = drawing.constants;
     FrameResources& resources = *drawing.resources;
-    if (shared->composes()) VCP_TRY(shared->compose.prepare(resources, constants));
+    if (shared->composes()) VCP_TRY(shared->compose.prepare(resources, constants, frame.isLit));
     if (frame.part && i == 0) {
         resources.setSums(sums.buffer(), frames[*drawn].layers.front().resources->picture());
         VCP_TRY(shared->accumulate.prepare(resources, constants));
@@ -137,10 +138,13 @@ Result<void> Renderer::View::choosePipelines(Frame& frame, size_t i) {
         VCP_TRY(shared->paperTrace.prepare(resources, constants, sections != SectionKind::None, request.march));
     else
         VCP_TRY(shared->trace.prepare(resources, constants, sections));
-    const bool traceLight = hasLight(request.shading);
-    if (traceLight) VCP_TRY(shared->light.prepare(resources, constants));
+    const ShadeLight light = frame.isLit                 ? ShadeLight::Scene
+                             : hasLight(request.shading) ? ShadeLight::Own
+                                                         : ShadeLight::None;
+    if (light == ShadeLight::Own) VCP_TRY(shared->light.prepare(resources, constants));
+    if (light == ShadeLight::Scene) VCP_TRY(shared->sceneLight.prepare(resources, constants));
     if (drawing.listened) VCP_TRY(shared->feedback.prepare(resources, constants));
-    return shared->shade.prepare(resources, constants, traceLight);
+    return shared->shade.prepare(resources, constants, light);
 }
 
 void Renderer::View::record(VkCommandBuffer commands, Frame& frame, const FrameStep& step, TileRange tiles) {
@@ -157,6 +161,16 @@ void Renderer::View::record(VkCommandBuffer commands, Frame& frame, const FrameS
         case FrameStep::Pass::Light:
             if (tiles.first == 0) drawing.timer.mark(commands, 2);
             return shared->light.record(commands, *drawing.resources, tiles);
+        case FrameStep::Pass::Gather:
+            drawing.timer.mark(commands, 2);
+            shared->compose.record(commands, *drawing.resources);
+            return barrierToAll(commands);
+        case FrameStep::Pass::SceneLight:
+            if (tiles.first == 0 && &step == frame.firstLight()) {
+                frame.lightTimer.reset(commands);
+                frame.lightTimer.mark(commands, 0);
+            }
+            return shared->sceneLight.record(commands, *drawing.resources, step.ray, tiles);
         case FrameStep::Pass::Shade:
             return recordShade(commands, frame, step.layer);
     }
@@ -173,6 +187,8 @@ void Renderer::View::recordBeam(VkCommandBuffer commands, Frame& frame, size_t i
                        shared->stripes, drawing.constants.colour, layer.errorPixels, layer.placement);
     c.feedbackX = shared->feedback.jitter().x;
     c.feedbackY = shared->feedback.jitter().y;
+    if (frame.isLit && drawing.request.shading.occlusionRadius <= 0)
+        c.occlusionReach = float(occlusionRadius() / double(c.worldPerCell));
     if (frame.part) {
         c.partRow = frame.part->row;
         c.partRows = frame.part->rows;
@@ -192,16 +208,20 @@ void Renderer::View::recordShade(VkCommandBuffer commands, Frame& frame, size_t 
     LayerFrame& drawing = frame.layers[i];
     FrameResources& resources = *drawing.resources;
     const PassTimer& timer = drawing.timer;
-    if (!hasLight(drawing.request.shading)) timer.mark(commands, 2);
+    if (frame.isLit && i + 1 == layers.size()) frame.lightTimer.mark(commands, 1);
+    if (frame.isLit)
+        barrierComputeToCompute(commands);
+    else if (!hasLight(drawing.request.shading))
+        timer.mark(commands, 2);
     timer.mark(commands, 3);
     shared->shade.record(commands, resources);
-    if (shared->composes()) shared->compose.record(commands, resources);
+    if (shared->composes() && !frame.isLit) shared->compose.record(commands, resources);
     timer.mark(commands, 4);
     if (drawing.listened) shared->feedback.record(commands);
     if (drawing.reports()) drawing.feedback.recordReadback(commands);
     timer.mark(commands, 5);
     resources.recordReadback(commands, frame.cursor);
-    if (shared->composes()) frame.target.recordReadback(commands);
+    if (shared->composes() && (!frame.isLit || i == 0)) frame.target.recordReadback(commands);
 }
 
 Result<void> Renderer::View::recordSurfaces(VkCommandBuffer commands, Frame& frame) {
@@ -251,7 +271,7 @@ double Renderer::finishedPart() const {
     }
     if (frame.isUnfinished())
         if (const FrameStep& step = frame.steps[frame.nextStep]; frame.nextTile > 0)
-            done += step.raysPerPixel * double(frame.nextTile) / View::listedTiles(frame, step.layer);
+            done += step.raysPerPixel * double(frame.nextTile) / View::tilesOf(frame, step);
     return all > 0 ? done / all : 0;
 }
 
@@ -313,7 +333,9 @@ Result<bool> Renderer::View::drawStep() {
     for (size_t i = 0; i < layers.size(); ++i) {
         refreshTable(layers[i]);
         // Pages have come and gone: the rest of the frame would not fit what is drawn of it.
-        const bool isBegun = i <= frame.steps[frame.nextStep - 1].layer;  // the beams were the first step
+        const bool isBegun =
+            std::any_of(frame.steps.begin(), frame.steps.begin() + std::ptrdiff_t(frame.nextStep),
+                        [&](const FrameStep& step) { return step.pass == FrameStep::Pass::Beam && step.layer == i; });
         if (!isBegun || layers[i].tableNumber == frame.layers[i].tableNumber) continue;
         abandonFrame();
         return false;
@@ -337,7 +359,41 @@ uint64_t Renderer::View::raysOf(const FrameRequest& request) const {
     return uint64_t{request.width} * request.height * raysPerPixel(request, shared->meso != nullptr);
 }
 
+bool Renderer::View::isLit(const FrameRequest& request) const {
+    const auto shown = std::count_if(layers.begin(), layers.end(), [](const Layer& layer) { return layer.casts(); });
+    return hasLight(request.shading) && shown > 1;
+}
+
+double Renderer::View::occlusionRadius() const {
+    std::vector<PictureDataset> shown;
+    for (const Layer& layer : layers)
+        if (layer.casts()) shown.push_back({layer.residency->dataset(), layer.placement});
+    return occlusionRadiusAmong(shown);
+}
+
+/// All datasets are traced before any ray of light is cast. The first one is shaded last: of surfaces at one place it
+/// is the one that is seen.
+std::vector<FrameStep> Renderer::View::litStepsOf(const FrameRequest& request) const {
+    std::vector<FrameStep> steps;
+    std::vector<size_t> casters;
+    for (size_t i = 0; i < layers.size(); ++i) {
+        if (layers[i].casts()) casters.push_back(i);
+        steps.push_back({FrameStep::Pass::Beam, i, 0});
+        steps.push_back({FrameStep::Pass::Trace, i, layers[i].isPaper() ? 0u : 1u});
+        steps.push_back({FrameStep::Pass::Gather, i, 0});
+    }
+    const auto addRay = [&](uint32_t ray) {
+        for (const size_t i : casters)
+            steps.push_back({FrameStep::Pass::SceneLight, i, 1, {ray, i == casters.front(), i == casters.back(), 0}});
+    };
+    for (uint32_t ray = 0; ray < request.shading.occlusionRays; ++ray) addRay(ray);
+    if (request.shading.shadows) addRay(frame::kSunRay);
+    for (size_t i = layers.size(); i-- > 0;) steps.push_back({FrameStep::Pass::Shade, i, 0});
+    return steps;
+}
+
 std::vector<FrameStep> Renderer::View::stepsOf(const FrameRequest& request) const {
+    if (isLit(request)) return litStepsOf(request);
     std::vector<FrameStep> steps;
     for (size_t i = 0; i < layers.size(); ++i) {
         const FrameRequest drawable = layers[i].drawable(request);
@@ -349,14 +405,16 @@ std::vector<FrameStep> Renderer::View::stepsOf(const FrameRequest& request) cons
     return steps;
 }
 
-uint32_t Renderer::View::listedTiles(const Frame& frame, size_t i) {
-    return frame.layers[i].resources->counts().listedTiles;
+uint32_t Renderer::View::tilesOf(const Frame& frame, const FrameStep& step) {
+    const FrameResources& resources = *frame.layers[step.layer].resources;
+    const bool all = step.pass == FrameStep::Pass::SceneLight;
+    return all ? resources.size().tilesX() * resources.size().tilesY() : resources.counts().listedTiles;
 }
 
 TileRange Renderer::View::takeTiles(Frame& frame, bool one) const {
     const FrameStep& step = frame.steps[frame.nextStep];
     // The beams, a step of their own, are done, and have told how many there are.
-    const uint32_t all = one && step.raysPerPixel > 0 ? listedTiles(frame, step.layer) : 0;
+    const uint32_t all = one && step.raysPerPixel > 0 ? tilesOf(frame, step) : 0;
     TileRange tiles;
     if (all > 0) {
         const uint64_t wanted = stepRays / (uint64_t{frame::kTileSize} * frame::kTileSize * step.raysPerPixel);
@@ -389,6 +447,7 @@ Result<void> Renderer::View::submit(size_t which, const FrameRequest& request,
     frame.stats = {.rays = uint64_t{request.width} * request.height};
     frame.isAhead = false;
     const bool isStepwise = mayTakeSteps && shared->info.software && raysOf(request) > kMostRaysAtOnce;
+    frame.isLit = isLit(request);
     frame.steps = stepsOf(request);
     frame.nextStep = 0;
     frame.nextTile = 0;
@@ -399,17 +458,18 @@ Result<void> Renderer::View::submit(size_t which, const FrameRequest& request,
 Result<void> Renderer::View::submitSteps(Frame& frame, bool one) {
     VCP_TRY_ASSIGN(auto commands, shared->device->beginCommands());
     barrierToAll(commands);
-    bool isFirst = true, goesOn = true;
+    std::optional<size_t> bound;  // the layer whose descriptor set is
+    bool goesOn = true;
     while (frame.isUnfinished() && goesOn) {
-        const FrameStep step = frame.steps[frame.nextStep];
+        const FrameStep& step = frame.steps[frame.nextStep];
         if (step.pass == FrameStep::Pass::Beam) {
             VCP_TRY(prepare(frame, step.layer));
-        } else if (isFirst) {
+        } else if (bound != step.layer) {
             VCP_TRY(choosePipelines(frame, step.layer));
             frame.layers[step.layer].resources->bind(commands);
         }
         record(commands, frame, step, takeTiles(frame, one));
-        isFirst = false;
+        bound = step.layer;
         if (one && step.pass == FrameStep::Pass::Beam) frame.layers[step.layer].resources->recordListedTiles(commands);
         goesOn = !one;
     }
@@ -488,6 +548,10 @@ Result<void> Renderer::View::takeIn(Frame& frame) {
     if (frame.part) return {};
     FrameStats stats = frame.stats;
     for (size_t i = 0; i < frame.layers.size(); ++i) VCP_TRY(addStats(frame, i, stats));
+    if (frame.isLit) {
+        VCP_TRY_ASSIGN(const auto ms, frame.lightTimer.read());
+        stats.msLight = ms.front();
+    }
     if (shared->composes()) stats.hitPixels = frame.target.hitPixels();
     MesoReport surfaces;
     if (shared->meso) {
@@ -516,7 +580,7 @@ Result<void> Renderer::View::addStats(const Frame& frame, size_t i, FrameStats& 
     VCP_TRY_ASSIGN(const auto ms, layer.timer.read());
     all.msBeam += ms[0];
     all.msTrace += ms[1];
-    all.msLight += ms[2];
+    if (!frame.isLit) all.msLight += ms[2];
     all.msShade += ms[3];
     all.msFeedback += ms[4];
     return {};
@@ -532,11 +596,16 @@ Result<void> Renderer::View::addSurfaceStats(const Frame& frame, FrameStats& all
 
 /// Hands what the rays hit and asked for to the residencies.
 void Renderer::View::hear(const Frame& frame) {
+    std::vector<SeenPages> seen;
     for (size_t i = 0; i < frame.layers.size(); ++i) {
         const LayerFrame& layer = frame.layers[i];
         if (!layer.asked) continue;
-        layers[i].residency->see(layer.feedback.pagesHit(), selectionView(layer.request), layer.cutNumber, number);
+        Residency& residency = *layers[i].residency;
+        const bool isOfNow = layer.others == residency.others(number);
+        seen.push_back(
+            {&residency, layer.feedback.pagesHit(), selectionView(layer.request), isOfNow ? layer.cutNumber : 0});
     }
+    seeAll(std::move(seen), number);
     if (std::any_of(frame.layers.begin(), frame.layers.end(), [](const LayerFrame& layer) { return layer.listened; }))
         feedbackPicture.reset();
     for (size_t i = 0; i < frame.layers.size(); ++i) {

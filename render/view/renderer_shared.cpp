@@ -82,6 +82,7 @@ void Renderer::Shared::clearPipelines() {
     trace.clear();
     paperTrace.clear();
     light.clear();
+    sceneLight.clear();
     shade.clear();
     feedback.clear();
     compose.clear();

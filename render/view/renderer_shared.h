@@ -13,6 +13,7 @@
 #include "render/passes/light.h"
 #include "render/passes/meso_surface.h"
 #include "render/passes/paper_trace.h"
+#include "render/passes/scene_light.h"
 #include "render/passes/shade.h"
 #include "render/passes/trace.h"
 #include "render/residencies.h"
@@ -37,6 +38,7 @@ struct Renderer::Shared {
     TracePass trace;
     PaperTracePass paperTrace;
     LightPass light;
+    SceneLightPass sceneLight;
     ShadePass shade;
     FeedbackPass feedback;
     ComposePass compose;

@@ -76,11 +76,14 @@ Result<void> Renderer::View::makeLayers(Frame& frame) {
         made.timer = std::move(clock);
         bindPools(frame);
     }
+    if (shared->composes() && !frame.lightTimer.hasClock()) {
+        VCP_TRY_ASSIGN(frame.lightTimer, PassTimer::create(device, 2));
+    }
     if (shared->meso && !frame.surfacesTimer.hasClock()) {
         VCP_TRY_ASSIGN(frame.surfacesTimer, PassTimer::create(device, 2));
     }
     if (shared->composes()) return {};
-    frame.layers.front().resources->setTarget(nullptr, nullptr);
+    frame.layers.front().resources->setTarget(nullptr, nullptr, nullptr);
     frame.target = {};
     frame.surfaces = {};
     return {};
@@ -162,17 +165,10 @@ Result<UpdateResult> Renderer::View::updateAll(const FrameRequest& request) {
     if (shared->device->isLost()) return Error{.code = ErrorCode::Device, .message = "the device was lost"};
     VCP_TRY(takeInDone());
     VCP_TRY(hideAsAsked(request));
-    std::optional<UpdateResult> all;
-    for (Layer& layer : layers) {
-        if (layer.residency == nullptr) continue;
-        auto one = layer.residency->update(selectionView(requestIn(layer.placement, request)), number);
-        if (!one) return one;
-        layer.errorPixels = one->errorPixels;
-        if (all)
-            add(*all, *one);
-        else
-            all = *std::move(one);
-    }
+    std::vector<ShownResidency> shown;
+    for (Layer& layer : layers)
+        if (layer.residency != nullptr) shown.push_back({layer.residency, layer.placement, &layer.errorPixels});
+    VCP_TRY_ASSIGN(auto all, updateShown(shown, request, number));
     if (!all)
         all = UpdateResult{.settled = true,
                            .drawable = !shared->datasets.empty(),

@@ -8,6 +8,7 @@
 // what only the device touches is ordered by the barrier at the start of each frame.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <chrono>
 
@@ -30,10 +31,12 @@ constexpr uint32_t kPassMarks = 6;
 /// which the device can do other things: a step is a pass, or, where rays are cast, as many tiles of it as take a short
 /// time.
 struct FrameStep {
-    enum class Pass { Beam, Trace, Light, Shade };
+    /// Gather and SceneLight: of pictures whose datasets shade each other.
+    enum class Pass { Beam, Trace, Light, Gather, SceneLight, Shade };
     Pass pass = Pass::Beam;
     size_t layer = 0;
     uint32_t raysPerPixel = 0;  // 0: the pass is not parted
+    frame::SceneRay ray{};      // of SceneLight
 };
 
 struct Renderer::View {
@@ -56,6 +59,8 @@ struct Renderer::View {
         [[nodiscard]] bool isPaper() const {
             return residency != nullptr && residency->dataset().header.method == Method::Paper;
         }
+        /// Whether rays of light go through it.
+        [[nodiscard]] bool casts() const { return residency != nullptr && !isPaper(); }
         /// Whether the next frame has a feedback pass.
         [[nodiscard]] bool listens() const { return residency != nullptr && residency->listens() && !isPaper(); }
         /// Whether the next frame of the view says which pages its rays hit.
@@ -80,6 +85,7 @@ struct Renderer::View {
         bool listened = false;     // the frame has a feedback pass
         bool asked = false;        // its rays say which pages they hit
         uint64_t cutNumber = 0;    // of what is drawn (Residency::cutNumber)
+        uint64_t others = 0;       // what is drawn beside it (Residency::others)
 
         [[nodiscard]] bool reports() const { return listened || asked; }
     };
@@ -94,7 +100,8 @@ struct Renderer::View {
         std::vector<LayerFrame> layers;  // one for each of the view's; the first one's picture is the frame's
         ComposeTarget target;            // pictures are composed into it
         MesoTarget surfaces;
-        PassTimer surfacesTimer;
+        PassTimer surfacesTimer, lightTimer;
+        bool isLit = false;  // the datasets shade each other
         FrameRequest request;
         std::vector<FrameStep> steps;
         size_t nextStep = 0;              // the first one that is not wholly submitted
@@ -109,6 +116,11 @@ struct Renderer::View {
         std::optional<CastPicture> cast;  // in place of what the layers' passes draw
 
         [[nodiscard]] bool isUnfinished() const { return nextStep < steps.size(); }
+        /// The first step that casts light through several datasets, or the end.
+        [[nodiscard]] const FrameStep* firstLight() const {
+            return &*std::find_if(steps.begin(), steps.end(),
+                                  [](const FrameStep& step) { return step.pass == FrameStep::Pass::SceneLight; });
+        }
         [[nodiscard]] const Buffer& picture() const {
             return cast ? cast->colours : layers.front().resources->picture();
         }
@@ -188,8 +200,14 @@ struct Renderer::View {
     /// Submits one of the frame's next steps, or all, and with the last one what follows them.
     Result<void> submitSteps(Frame& frame, bool one);
     [[nodiscard]] std::vector<FrameStep> stepsOf(const FrameRequest& request) const;
-    /// Returns the number of tiles that a frame's beams could not prove empty. Precondition: they are done.
-    static uint32_t listedTiles(const Frame& frame, size_t layer);
+    [[nodiscard]] std::vector<FrameStep> litStepsOf(const FrameRequest& request) const;
+    /// How far occlusion reaches where datasets shade each other, world units.
+    [[nodiscard]] double occlusionRadius() const;
+    /// Whether rays of light go through more than the dataset that they begin on.
+    [[nodiscard]] bool isLit(const FrameRequest& request) const;
+    /// Returns the number of tiles that a step works on: those of the layer that a frame's beams could not prove empty,
+    /// or all. Precondition: the beams are done.
+    static uint32_t tilesOf(const Frame& frame, const FrameStep& step);
     /// Returns the tiles of the frame's next step, and goes on behind them.
     TileRange takeTiles(Frame& frame, bool one) const;
     /// Makes steps shorter or longer by what the last one took.

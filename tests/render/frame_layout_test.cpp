@@ -15,6 +15,7 @@
 #include "render/meso_surface_spirv.h"
 #include "render/paper_trace_spirv.h"
 #include "render/passes/meso_resources.h"
+#include "render/scene_light_spirv.h"
 #include "render/shade_spirv.h"
 #include "render/shared/frame.h"
 #include "render/trace_spirv.h"
@@ -131,6 +132,7 @@ TEST(FrameLayout, Accumulate) { expectSameLayout(kAccumulateSpirv); }
 TEST(FrameLayout, Compose) { expectSameLayout(kComposeSpirv); }
 TEST(FrameLayout, PaperTrace) { expectSameLayout(kPaperTraceSpirv); }
 TEST(FrameLayout, Feedback) { expectSameLayout(kFeedbackSpirv); }
+TEST(FrameLayout, SceneLight) { expectSameLayout(kSceneLightSpirv); }
 TEST(FrameLayout, Shade) { expectSameLayout(kShadeSpirv); }
 TEST(FrameLayout, Trace) {
     expectSameLayout(kTraceSpirv);

@@ -1,0 +1,107 @@
+#include "render/host/layer_tiles.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <glm/packing.hpp>
+
+#include "render/host/hit_surface.h"
+#include "render/host/section_caps.h"
+
+namespace vcp {
+
+void setAlbedo(TileSurface& surface, int i, glm::vec4 colour) {
+    surface.red[i] = colour.x;
+    surface.green[i] = colour.y;
+    surface.blue[i] = colour.z;
+}
+
+float skyAround(std::span<const float> depth, std::span<const uint8_t> sky, glm::ivec2 size, glm::ivec2 pixel,
+                float reach) {
+    const auto at = [&](glm::ivec2 p) { return size_t(p.y) * size_t(size.x) + size_t(p.x); };
+    float sum = 0, count = 0;
+    for (int i = 0; i < 16; ++i) {
+        const glm::ivec2 p = glm::clamp(pixel + glm::ivec2((i & 3) - 1, (i >> 2) - 1), glm::ivec2(0), size - 1);
+        if (!(std::abs(depth[at(p)] - depth[at(pixel)]) <= reach)) continue;
+        sum += float(sky[at(p)]) / 255;
+        ++count;
+    }
+    return sum / std::max(count, 1.0f);
+}
+
+LayerTiles::LayerTiles(const HostLayer& layer, glm::ivec2 size)
+    : layer_(layer),
+      size_(size),
+      isColoured_(layer.hasColour &&
+                  (layer.frame.shadingMode == frame::kShadeLit || layer.frame.shadingMode == frame::kShadeUnlit)),
+      turn_(layer.frame.rotation.w, layer.frame.rotation.x, layer.frame.rotation.y, layer.frame.rotation.z),
+      sections_(inCells(layer.rays.sections, layer.scene.grid().origin, layer.scene.grid().cell)),
+      beginInEye_(sections_.empty() && layer.rays.originPerX == glm::dvec3(0) &&
+                  layer.rays.originPerY == glm::dvec3(0)) {
+    if (layer_.marks != nullptr && beginInEye_) markBegin({0, 0});
+}
+
+void LayerTiles::cast(TileHits& hits) const {
+    castTile(layer_.scene, layer_.rays, hits);
+    if (layer_.caps) castCaps(layer_.scene, layer_.rays, hits, cameraMarks());
+    if (layer_.marks != nullptr) markPages(hits);
+}
+
+LayerTiles::CellRay LayerTiles::rayOf(glm::ivec2 pixel) const {
+    const HostGrid& grid = layer_.scene.grid();
+    const glm::dvec2 at = glm::dvec2(pixel) + 0.5;
+    return {(layer_.rays.originAt(at.x, at.y) - grid.origin) / grid.cell,
+            glm::normalize(layer_.rays.directionAt(at.x, at.y))};
+}
+
+void LayerTiles::markBegin(glm::ivec2 pixel) const {
+    const CellRay ray = rayOf(pixel);
+    const KeptInterval kept = keptInterval(sections_, ray.origin, ray.direction);
+    if (!(kept.first < kept.last)) return;
+    const auto page = layer_.scene.pageAt(ray.origin + kept.first * ray.direction);
+    if (page) layer_.marks->byCamera.mark(*page);
+}
+
+/// Marks the pages that a tile's rays hit, and those that they begin in where these are not the same for all.
+void LayerTiles::markPages(const TileHits& hits) const {
+    if (hits.any)
+        for (const HitLeaf& leaf : hits.leaves) layer_.marks->byCamera.mark(leaf.page);
+    if (!beginInEye_) forEachPixel(size_, hits.corner, [&](glm::ivec2 pixel, int) { markBegin(pixel); });
+}
+
+void LayerTiles::findAlbedo(const TileHits& hits, TileSurface& surface) const {
+    setClay(surface);
+    if (!isColoured_ && hits.onCap.none()) return;
+    forEachPixel(size_, hits.corner, [&](glm::ivec2, int i) {
+        if (!std::isfinite(hits.depth[i])) return;
+        // Colours have 8 bits between the passes of a device, too.
+        if (hits.onCap[size_t(i)])
+            setAlbedo(surface, i, layer_.frame.cap);
+        else if (isColoured_)
+            setAlbedo(surface, i, glm::unpackUnorm4x8(glm::packUnorm4x8(colourAt(layer_.scene, hits, i))));
+    });
+}
+
+void LayerTiles::setClay(TileSurface& surface) const {
+    std::fill_n(surface.red, kTilePixels, layer_.frame.clay.x);
+    std::fill_n(surface.green, kTilePixels, layer_.frame.clay.y);
+    std::fill_n(surface.blue, kTilePixels, layer_.frame.clay.z);
+}
+
+HostHit LayerTiles::hitOf(const TileHits& hits, int i) const {
+    return {layer_.number, hits.leaves[hits.leaf[i]].page & INT32_MAX, hits.onCap[size_t(i)]};
+}
+
+glm::dvec3 LayerTiles::above(glm::ivec2 pixel, double depth, float lift, glm::vec3 normal) const {
+    const CellRay ray = rayOf(pixel);
+    return ray.origin + depth * ray.direction + glm::dvec3(lift * normal);
+}
+
+LightRay LayerTiles::lightRay(glm::dvec3 origin, glm::vec3 direction, float reach) const {
+    if (!sections_.empty()) reach = std::min(reach, float(keptInterval(sections_, origin, direction).last));
+    return {origin, direction, reach};
+}
+
+}  // namespace vcp

@@ -1,0 +1,85 @@
+// One layer of a picture, tile by tile: what the camera's rays hit, in which colours, and where rays of light begin
+// there. Any thread, but for the constructor.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include <glm/gtc/quaternion.hpp>
+
+#include "render/host/host_picture.h"
+#include "render/host/light_rays.h"
+#include "render/host/section_cut.h"
+#include "render/host/tile_hits.h"
+#include "render/host/tile_shading.h"
+
+namespace vcp {
+
+/// Calls visit(pixel of the picture, element of the tile's arrays) for each pixel of a tile in a picture of `size`.
+template <class Visit>
+void forEachPixel(glm::ivec2 size, glm::ivec2 corner, const Visit& visit) {
+    const glm::ivec2 part = glm::min(size - corner, glm::ivec2(kTileWidth, kTileHeight));
+    for (int y = 0; y < part.y; ++y)
+        for (int x = 0; x < part.x; ++x) visit(corner + glm::ivec2(x, y), y * kTileWidth + x);
+}
+
+void setAlbedo(TileSurface& surface, int i, glm::vec4 colour);
+
+/// Returns how much sky is seen at a pixel, averaged over the pixels around whose depths differ by at most `reach`:
+/// each pixel of a square of 4 x 4 has its own directions. `sky`: of each pixel, 0 to 255.
+float skyAround(std::span<const float> depth, std::span<const uint8_t> sky, glm::ivec2 size, glm::ivec2 pixel,
+                float reach);
+
+class LayerTiles {
+public:
+    /// `size`: of the picture.
+    LayerTiles(const HostLayer& layer, glm::ivec2 size);
+
+    /// Casts the tile whose upper left pixel is hits.corner, with caps, and marks pages.
+    void cast(TileHits& hits) const;
+    /// Finds the colours of a tile's hits without light.
+    void findAlbedo(const TileHits& hits, TileSurface& surface) const;
+    void setClay(TileSurface& surface) const;
+
+    /// Whether hits are shown in their own colours.
+    [[nodiscard]] bool isColoured() const { return isColoured_; }
+    /// The rotation from the dataset's axes to the world's.
+    [[nodiscard]] const glm::quat& turn() const { return turn_; }
+    [[nodiscard]] HostHit hitOf(const TileHits& hits, int i) const;
+    [[nodiscard]] PageMarks* lightMarks() const { return layer_.marks != nullptr ? &layer_.marks->byLight : nullptr; }
+
+    [[nodiscard]] float depthInCells(float depth) const { return float(double(depth) / layer_.scene.grid().cell); }
+    /// A pixel's edge at a depth; both in finest cells.
+    [[nodiscard]] float pixelEdgeAt(float depth) const {
+        return layer_.frame.pixelEdge + layer_.frame.pixelEdgePerDepth * depth;
+    }
+    /// By how much rays of light begin above a hit at a depth, both in finest cells: more than the picture's own error
+    /// and the roundings.
+    [[nodiscard]] float liftAt(float depth) const { return 0.15f + layer_.frame.lightLift * pixelEdgeAt(depth); }
+
+    /// Returns a point above a hit, in finest cells from the root's lowest corner. `depth` and `lift`: finest cells;
+    /// `normal`: in the dataset's axes.
+    [[nodiscard]] glm::dvec3 above(glm::ivec2 pixel, double depth, float lift, glm::vec3 normal) const;
+    /// Returns a ray of light, no farther than section planes leave it. All in finest cells.
+    [[nodiscard]] LightRay lightRay(glm::dvec3 origin, glm::vec3 direction, float reach) const;
+
+private:
+    /// A pixel's ray, in finest cells from the root's lowest corner.
+    struct CellRay {
+        glm::dvec3 origin, direction;
+    };
+    [[nodiscard]] CellRay rayOf(glm::ivec2 pixel) const;
+    [[nodiscard]] PageMarks* cameraMarks() const { return layer_.marks != nullptr ? &layer_.marks->byCamera : nullptr; }
+    /// Marks the page that a pixel's ray begins in: it may miss it and hit what is below.
+    void markBegin(glm::ivec2 pixel) const;
+    void markPages(const TileHits& hits) const;
+
+    const HostLayer& layer_;
+    const glm::ivec2 size_;
+    const bool isColoured_;
+    const glm::quat turn_;
+    const std::vector<SectionCut> sections_;  // finest cells from the root's lowest corner
+    const bool beginInEye_;                   // all rays begin at one point
+};
+
+}  // namespace vcp

@@ -1,0 +1,225 @@
+#include "render/host/lit_layers.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <memory>
+
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+
+#include "render/host/hit_light.h"
+#include "render/host/layer_tiles.h"
+
+namespace vcp {
+
+namespace {
+
+constexpr float kNothing = std::numeric_limits<float>::infinity();
+// Occlusion rays of so many numbers are cast side by side: they meet the same leaves.
+constexpr uint32_t kAtOnce = 8;
+
+uint8_t toByte(float x) { return uint8_t(std::lround(255 * x)); }
+
+/// A layer, and what takes rays of the world into it.
+struct Lit {
+    Lit(const HostLayer& from, glm::ivec2 size)
+        : layer(from),
+          tiles(from, size),
+          fromWorld(glm::conjugate(tiles.turn())),
+          cell(from.scene.grid().cell * from.worldPerUnit) {}
+
+    const HostLayer& layer;
+    const LayerTiles tiles;
+    const glm::quat fromWorld;
+    const double cell;  // world units
+};
+
+/// What is kept of each pixel beside the picture's depth, normal and hit; lengths are world units.
+struct LitPlanes {
+    explicit LitPlanes(size_t pixels) : albedo(pixels), lift(pixels), edge(pixels), sun(pixels), sky(pixels) {}
+
+    std::vector<glm::vec3> albedo;
+    std::vector<float> lift, edge;  // by which rays of light begin above the hit; of the pixel there
+    std::vector<uint8_t> sun, sky;
+};
+
+/// The hits of a tile, and the light there.
+struct LitTile {
+    struct Pixel {
+        glm::ivec2 pixel;
+        size_t at;  // in the picture
+        glm::vec3 normal;
+    };
+    Pixel pixels[kTilePixels];
+    size_t count = 0;
+};
+
+class LitDrawing {
+public:
+    LitDrawing(std::span<const HostLayer> layers, HostPicture& picture)
+        : picture_(picture),
+          planes_(picture.colours.size()),
+          frame_(layers.front().frame),
+          reach_(frame_.occlusionReach * frame_.worldPerCell) {
+        for (const HostLayer& layer : layers) {
+            lit_.push_back(std::make_unique<Lit>(layer, picture.size));
+            isMarking_ = isMarking_ || layer.marks != nullptr;
+        }
+        // Light is computed in the world's axes.
+        const glm::quat turn = lit_.front()->tiles.turn();
+        frame_.lightDirection = glm::vec4(turn * glm::vec3(frame_.lightDirection), 0);
+        frame_.upDirection = glm::vec4(turn * glm::vec3(frame_.upDirection), 0);
+    }
+
+    Result<void> draw(const HostCastOptions& options) {
+        const bool averagesSky = frame_.occlusionRays > 0;
+        VCP_TRY(forEachTile(picture_.size, options, [&](glm::ivec2 corner) {
+            for (const auto& each : lit_) castLayer(*each, corner);
+            const LitTile tile = hitsOf(corner);
+            if (tile.count == 0) return;
+            for (size_t k = 0; k < tile.count; ++k) planes_.sun[tile.pixels[k].at] = 255;
+            if (frame_.hasShadows != 0) castSun(tile);
+            if (averagesSky)
+                castSky(tile);
+            else
+                shade(corner, false);
+        }));
+        if (!averagesSky) return {};
+        return forEachTile(picture_.size, options, [&](glm::ivec2 corner) { shade(corner, true); });
+    }
+
+private:
+    [[nodiscard]] size_t at(glm::ivec2 pixel) const {
+        return size_t(pixel.y) * size_t(picture_.size.x) + size_t(pixel.x);
+    }
+
+    /// Puts a layer's hits in a tile into the picture, where they are nearer than what is there.
+    void castLayer(const Lit& each, glm::ivec2 corner) {
+        TileHits hits;
+        hits.corner = corner;
+        each.tiles.cast(hits);
+        if (!hits.any) return;
+        TileSurface surface;
+        findNormals(each.layer.rays, hits, surface);
+        each.tiles.findAlbedo(hits, surface);
+        forEachPixel(picture_.size, corner, [&](glm::ivec2 pixel, int i) {
+            const size_t to = at(pixel);
+            const auto depth = float(double(hits.depth[i]) * each.layer.worldPerUnit);
+            if (!(depth < picture_.depth[to])) return;
+            const float inCells = each.tiles.depthInCells(hits.depth[i]);
+            picture_.depth[to] = depth;
+            picture_.normals[to] = each.tiles.turn() * surface.normal(i);
+            picture_.hits[to] = each.tiles.hitOf(hits, i);
+            planes_.albedo[to] = {surface.red[i], surface.green[i], surface.blue[i]};
+            planes_.lift[to] = float(double(each.tiles.liftAt(inCells)) * each.cell);
+            planes_.edge[to] = float(double(each.tiles.pixelEdgeAt(inCells)) * each.cell);
+        });
+    }
+
+    [[nodiscard]] LitTile hitsOf(glm::ivec2 corner) const {
+        LitTile tile;
+        forEachPixel(picture_.size, corner, [&](glm::ivec2 pixel, int) {
+            const size_t from = at(pixel);
+            if (picture_.depth[from] < kNothing) tile.pixels[tile.count++] = {pixel, from, picture_.normals[from]};
+        });
+        return tile;
+    }
+
+    /// Returns a ray of light through a layer from above a hit. `direction`: in the world; `reach`: world units.
+    [[nodiscard]] LightRay lightRay(const Lit& each, const LitTile::Pixel& from, glm::vec3 direction,
+                                    float reach) const {
+        const glm::dvec3 origin =
+            each.tiles.above(from.pixel, double(picture_.depth[from.at]) / each.cell,
+                             float(double(planes_.lift[from.at]) / each.cell), each.fromWorld * from.normal);
+        return each.tiles.lightRay(origin, each.fromWorld * direction, float(double(reach) / each.cell));
+    }
+
+    void castSun(const LitTile& tile) {
+        const glm::vec3 light(frame_.lightDirection);
+        LightRay rays[kTilePixels];
+        const LitTile::Pixel* from[kTilePixels];
+        float distances[kTilePixels];
+        for (const auto& each : lit_) {
+            size_t count = 0;
+            for (size_t k = 0; k < tile.count; ++k) {
+                const LitTile::Pixel& pixel = tile.pixels[k];
+                if (!(glm::dot(pixel.normal, light) > 0))
+                    planes_.sun[pixel.at] = 0;
+                else if (isMarking_ || planes_.sun[pixel.at] != 0) {
+                    rays[count] = lightRay(*each, pixel, light, frame::kNoHit);
+                    from[count++] = &pixel;
+                }
+            }
+            castLightRays(each->layer.scene, {rays, count}, distances, each->tiles.lightMarks());
+            for (size_t k = 0; k < count; ++k)
+                if (distances[k] < kNothing) planes_.sun[from[k]->at] = 0;
+        }
+    }
+
+    void castSky(const LitTile& tile) {
+        glm::vec3 directions[kAtOnce * kTilePixels];
+        float near[kAtOnce * kTilePixels], seen[kTilePixels] = {};
+        for (uint32_t first = 0; first < frame_.occlusionRays; first += kAtOnce) {
+            const uint32_t numbers = std::min(kAtOnce, frame_.occlusionRays - first);
+            for (uint32_t n = 0; n < numbers; ++n)
+                for (size_t k = 0; k < tile.count; ++k) {
+                    const LitTile::Pixel& from = tile.pixels[k];
+                    directions[n * tile.count + k] =
+                        f32::skyDirection(from.normal, first + n, frame_.occlusionRays, uint32_t(from.pixel.x),
+                                          uint32_t(from.pixel.y), frame_.sampleNumber);
+                }
+            std::fill_n(near, numbers * tile.count, reach_);
+            for (const auto& each : lit_) castNearer(*each, tile, {directions, numbers * tile.count}, near);
+            for (size_t i = 0; i < numbers * tile.count; ++i)
+                seen[i % tile.count] += near[i] < reach_ ? f32::skyBehind(near[i] / reach_) : 1.0f;
+        }
+        for (size_t k = 0; k < tile.count; ++k)
+            planes_.sky[tile.pixels[k].at] = toByte(seen[k] / float(frame_.occlusionRays));
+    }
+
+    /// Casts rays through a layer; those of one number, over the tile, are side by side. `near`: how far each comes,
+    /// world units.
+    void castNearer(const Lit& each, const LitTile& tile, std::span<const glm::vec3> directions, float* near) const {
+        LightRay rays[kAtOnce * kTilePixels];
+        float distances[kAtOnce * kTilePixels];
+        for (size_t i = 0; i < directions.size(); ++i)
+            rays[i] = lightRay(each, tile.pixels[i % tile.count], directions[i], isMarking_ ? reach_ : near[i]);
+        castLightRays(each.layer.scene, {rays, directions.size()}, distances, each.tiles.lightMarks());
+        for (size_t i = 0; i < directions.size(); ++i)
+            near[i] = std::min(near[i], float(double(distances[i]) * each.cell));
+    }
+
+    void shade(glm::ivec2 corner, bool averagesSky) {
+        const LitTile tile = hitsOf(corner);
+        if (tile.count == 0) return;
+        TileSurface surface{};
+        for (size_t k = 0; k < tile.count; ++k) {
+            const auto& [pixel, from, normal] = tile.pixels[k];
+            surface.normalX[k] = normal.x, surface.normalY[k] = normal.y, surface.normalZ[k] = normal.z;
+            setAlbedo(surface, int(k), glm::vec4(planes_.albedo[from], 1));
+            surface.sun[k] = float(planes_.sun[from]) / 255;
+            surface.sky[k] = averagesSky
+                                 ? skyAround(picture_.depth, planes_.sky, picture_.size, pixel, 8 * planes_.edge[from])
+                                 : 1.0f;
+        }
+        alignas(32) uint32_t colours[kTilePixels];
+        shadeTile(frame_, surface, colours);
+        for (size_t k = 0; k < tile.count; ++k) picture_.colours[tile.pixels[k].at] = colours[k];
+    }
+
+    HostPicture& picture_;
+    LitPlanes planes_;
+    frame::FrameConstants frame_;  // as of the first layer, in the world's axes
+    const float reach_;            // of occlusion, world units
+    bool isMarking_ = false;
+    std::vector<std::unique_ptr<const Lit>> lit_;
+};
+
+}  // namespace
+
+Result<void> drawLitLayers(std::span<const HostLayer> layers, const HostCastOptions& options, HostPicture& picture) {
+    return LitDrawing(layers, picture).draw(options);
+}
+
+}  // namespace vcp

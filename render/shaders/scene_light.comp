@@ -1,0 +1,72 @@
+// Casts a ray of light from each pixel of a picture of several datasets through one of them: the sun's, or one into the
+// sky. Dispatched for each ray and, one after the other, each dataset. Reads the dataset's pool and table, and depths,
+// normals and lifts of the picture; reads and writes its planes of light and of nearest hits.
+#version 450
+#extension GL_GOOGLE_include_directive : require
+#include "render/shaders/bindings.glsl"
+#include "render/shaders/rays.glsl"
+#include "render/shaders/tiles.glsl"
+const uint kHitBy = kHitByLight;
+#include "render/shaders/cast.glsl"
+#include "render/shaders/sections.glsl"
+#include "render/shaders/hit_records.glsl"
+#include "render/shared/hit_light.h"
+#include "render/shaders/scene_light.glsl"
+
+layout(local_size_x = 8, local_size_y = 8) in;
+layout(push_constant) uniform RayBlock { SceneRay light; };
+
+// Turns a vector from the world's axes to the dataset's.
+vec3 turnedFromWorld(vec3 v) { return turnedBy(-frame.rotation.xyz, frame.rotation.w, v); }
+
+// Returns the ray from above the hit at a depth. Lengths are world units.
+Ray lightRay(uvec2 pixel, float depth, float lift, vec3 normal, vec3 direction) {
+    Ray eye = rayAt(vec2(pixel) + 0.5), ray;
+    float perWorld = 1.0 / frame.worldPerCell;
+    ray.origin = eye.origin + depth * perWorld * eye.direction + lift * perWorld * turnedFromWorld(normal);
+    ray.direction = withoutZeros(turnedFromWorld(direction));
+    ray.inverse = 1.0 / ray.direction;
+    return ray;
+}
+
+void main() {
+    uvec2 pixel;
+    if (!anyPixel(pixel)) return;
+    uint at = pixel.y * frame.width + pixel.x;
+    float depth = sceneDepth(at);
+    if (depth >= kNoHit) return;
+    vec3 n = unpackHitNormal(sceneLight[sceneAt(kSceneNormal, at)]);
+    float lift = uintBitsToFloat(sceneLight[sceneAt(kSceneLift, at)]);
+    vec3 sun = turnedBy(frame.rotation.xyz, frame.rotation.w, frame.lightDirection.xyz);
+    bool isSun = light.number == kSunRay, lit = dot(n, sun) > 0.0;
+    uint sky = frame.occlusionRays, lightAt = sceneAt(kSceneLight, at), nearAt = sceneAt(kSceneNear, at);
+
+    // Where pages are marked, each ray goes through each dataset.
+    bool marks = frame.firstHitMark != 0u;
+    float near = isSun || light.isFirst != 0u ? kNoHit : uintBitsToFloat(sceneLight[nearAt]);
+    uint seen = isSun && light.isFirst != 0u && sky == 0u ? packUnorm4x8(vec4(lit ? 1.0 : 0.0, 1.0, 0.0, 0.0))
+                                                          : sceneLight[lightAt];
+    vec3 direction = isSun ? sun : skyDirection(n, light.number, sky, pixel.x, pixel.y, frame.sampleNumber);
+    Ray ray = lightRay(pixel, depth, lift, n, direction);
+    float radius = isSun ? kNoHit : marks ? frame.occlusionReach : min(frame.occlusionReach, near / frame.worldPerCell);
+    float reach = min(radius, keptInterval(ray).last);
+    bool needed = !isSun || (lit && (marks || (seen & 255u) != 0u));
+    Work work = Work(0u, 0u, 0u);
+    Hit hit = castRay(ray, needed ? 0.0 : kNoHit, reach, work);
+    bool blocked = hit.depth < reach;
+    if (isSun) {
+        sceneLight[lightAt] = blocked ? seen & ~255u : seen;
+        return;
+    }
+    if (blocked) near = min(near, hit.depth * frame.worldPerCell);
+    if (light.isLast == 0u) {
+        sceneLight[nearAt] = floatBitsToUint(near);
+        return;
+    }
+    // The sum over the rays becomes light with the last one.
+    float part = near / (frame.occlusionReach * frame.worldPerCell);
+    float open = (light.number == 0u ? 0.0 : uintBitsToFloat(seen)) + (part < 1.0 ? skyBehind(part) : 1.0);
+    float sunSeen = frame.hasShadows != 0u && !lit ? 0.0 : 1.0;
+    sceneLight[lightAt] =
+        light.number + 1u < sky ? floatBitsToUint(open) : packUnorm4x8(vec4(sunSeen, open / float(sky), 0.0, 0.0));
+}

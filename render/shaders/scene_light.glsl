@@ -1,0 +1,10 @@
+// The surfaces that a picture of several datasets shows, and the light there (passes/scene_light.h).
+
+layout(set = 0, binding = 16, std430) buffer TargetPictureBlock { uint targetPixels[]; };
+// Bits of floats, world units; behind them the count of pixels that something is hit in.
+layout(set = 0, binding = 17, std430) buffer TargetDepthBlock { uint targetDepths[]; };
+// Planes of width * height words: see kSceneNormal and what follows it.
+layout(set = 0, binding = 20, std430) buffer SceneLightBlock { uint sceneLight[]; };
+
+uint sceneAt(uint plane, uint pixel) { return plane * frame.width * frame.height + pixel; }
+float sceneDepth(uint pixel) { return uintBitsToFloat(targetDepths[pixel]); }
