@@ -55,7 +55,8 @@ PlacedCut placedCut(Residency& residency, ViewNumber view) {
                       .number = number,
                       .place = mortonDecode(entry.morton),
                       .level = entry.level,
-                      .error = float(double(entry.certifiedError) / dataset.header.cell)};
+                      .error = float(double(entry.certifiedError) / dataset.header.cell),
+                      .parts = entry.parts};
         if (partial == partials.end() || partial->page != number) {
             placed.pages.push_back(page);
             continue;
@@ -117,7 +118,7 @@ Result<void> drawDataset(const HostDataset& drawn, const FrameRequest& request, 
                           .rays = raysOf(seen),
                           .frame = frameConstants(seen, &dataset, 1, hasColour, drawn.errorPixels, drawn.placement),
                           .hasColour = hasColour,
-                          .caps = request.sectionCaps,
+                          .caps = capsOf(request, dataset),
                           .worldPerUnit = drawn.placement.scale,
                           .number = drawn.number,
                           .marks = asked ? &marks : nullptr};

@@ -59,7 +59,7 @@ public:
             TileHits hits;
             hits.corner = corner;
             castTile(layer_.scene, layer_.rays, hits);
-            if (layer_.caps) castCaps(layer_.scene, layer_.rays, hits, cameraMarks());
+            if (layer_.caps != Caps::None) castCaps(layer_.scene, layer_.rays, layer_.caps, hits, cameraMarks());
             if (layer_.marks != nullptr) markPages(hits, !beginInEye);
             if (hits.any) drawTile(hits);
         }));

@@ -35,7 +35,7 @@ struct SceneFile {
     std::optional<SceneLight> light;
     std::optional<OrbitCamera> camera;
     std::vector<SectionPlane> sections;  ///< at most kMostSections
-    bool sectionCaps = false;
+    Caps sectionCaps = Caps::None;
 };
 
 /// A scene has at most so many datasets.

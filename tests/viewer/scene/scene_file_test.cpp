@@ -30,7 +30,7 @@ TEST(SceneFile, TheDocumentsExampleIsRead) {
     ASSERT_TRUE(scene->camera);
     EXPECT_EQ(scene->camera->position, glm::dvec3(0, 0.2, 1.5));
     EXPECT_EQ(scene->sections, (std::vector<SectionPlane>{{{1, 0, 0}, 0.05}}));
-    EXPECT_TRUE(scene->sectionCaps);
+    EXPECT_EQ(scene->sectionCaps, Caps::Closed);
 }
 
 TEST(SceneFile, WhatIsWrongIsSaidWithItsLine) {
