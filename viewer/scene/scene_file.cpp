@@ -94,7 +94,7 @@ private:
 
     Caps caps(const Json& value) {
         if (value == "all") return Caps::All;
-        if (!value.is_boolean()) return wrong("/caps", "must be true, false or \"all\""), Caps::None;
+        if (!value.is_boolean()) return wrong("/caps", "must be true or false, or \"all\""), Caps::None;
         return value.get<bool>() ? Caps::Closed : Caps::None;
     }
 
