@@ -287,6 +287,7 @@ private:
             if (plan_.hasSlabs) files_.surfaces.emplace_back(space_, level, "surface");
         }
         files_.neededSurfaces = files_.surfaces.size();
+        files_.parts = std::make_unique<PartNotes>(space_, memory_.bufferBytes / 16);
     }
 
     /// Chooses the pages that hold the mesh, their grid once more where these would be too sparse, and the bins.
@@ -434,6 +435,7 @@ private:
 
     Result<void> runPass() {
         if (plan_.isOfSlabs(pass_)) return runSlabPass();
+        if (pass_ + 1 == plan_.levels()) VCP_TRY(joinParts());
         if (!files_.next && steps()) openPass();
         const int level = plan_.levelOf(pass_);
         const PagePartition partition = plan_.partitionOf(level);
@@ -484,15 +486,32 @@ private:
         });
     }
 
-    /// Returns the mesh of a bin; in the first pass, what is thin is kept and normals are found.
+    /// Returns the mesh of a bin; in the first pass, what is thin is kept, and normals and parts are found.
     Result<LatticeMesh> loadMesh(size_t bin) {
         VCP_TRY_ASSIGN(auto soup, files_.current->load(bin));
-        if (pass_ < plan_.levels()) return meshOf(soup, hasColour());
-        keepThin(soup, bin);
+        if (pass_ < plan_.levels()) {
+            if (pass_ + 1 == plan_.levels())
+                for (LatticeTriangle& t : soup) t.part = parts_->decided(t.part);
+            return meshOf(soup, hasColour());
+        }
+        const std::vector<Corners> changed = keepThin(soup, bin);
         LatticeMesh mesh = meshOf(soup, hasColour());
         std::vector<LatticeTriangle>().swap(soup);
         computeNormals(mesh);
+        VCP_TRY(files_.parts->add(mesh, changed, [&](glm::i32vec3 p) { return isIn(bin, p); }));
         return mesh;
+    }
+
+    /// Finds which parts of the mesh are closed, once all bins have noted theirs.
+    Result<void> joinParts() {
+        if (parts_) return {};
+        VCP_TRY_ASSIGN(parts_, files_.parts->join());
+        return {};
+    }
+
+    /// Whether a point of the deepest level's lattice is in a bin.
+    [[nodiscard]] bool isIn(size_t bin, glm::i32vec3 p) const {
+        return plan_.finest.binOf(plan_.gridOf(plan_.levels() - 1).pageOf(p)) == bin;
     }
 
     /// Builds the pass's pages from code `first` to before `end`. Leaves `mesh` on the lattice of their coarsest level.
@@ -516,10 +535,10 @@ private:
     }
 
     /// Keeps slivers and crumbs that would vanish on the lattice.
-    void keepThin(std::vector<LatticeTriangle>& soup, size_t bin) const {
+    std::vector<Corners> keepThin(std::vector<LatticeTriangle>& soup, size_t bin) const {
         const PageGrid grid = plan_.gridOf(plan_.levelOf(pass_));
-        keepCollapsed(
-            soup, [&](glm::i32vec3 p) { return plan_.finest.binOf(grid.pageOf(p)) == bin; },
+        return keepCollapsed(
+            soup, [&](glm::i32vec3 p) { return isIn(bin, p); },
             [&](glm::i32vec3 p, glm::i32vec3 q) { return grid.pageOf(p) == grid.pageOf(q); },
             [&](glm::i32vec3 p) { return plan_.pages.stepAt(p); });
     }
@@ -554,6 +573,11 @@ private:
     Result<void> write() {
         FileHeader header = headerOf(measures_, plan_.frame, plan_.errorTarget, hasColour());
         if (plan_.hasSlabs) header.flags |= kFlagCovering;
+        VCP_TRY(joinParts());
+        header.flags |= kFlagParts;
+        header.parts = parts_->counts.parts;
+        header.closedParts = parts_->counts.closed;
+        header.openEdges = parts_->counts.openEdges;
         VCP_TRY_ASSIGN(report_.fileBytes,
                        assembleDataset(files_.spools, header, options_.output, rules(), [this](double part) {
                            return progress("writing", 1 - kWritingShare + kWritingShare * part);
@@ -596,7 +620,8 @@ private:
     uint32_t levelsLess_ = 0;  ///< as chooseFrame took it
     BuildReport report_;
     WorkFiles files_;
-    LatticeMesh mesh_;  ///< what a pass hands to the next one, where it keepsMesh()
+    std::optional<MeshParts> parts_;  ///< once they are joined
+    LatticeMesh mesh_;                ///< what a pass hands to the next one, where it keepsMesh()
     int pass_ = 0;
     size_t firstBin_ = 0;  ///< where the pass that is resumed begins
 };

@@ -14,7 +14,7 @@ namespace {
 using nlohmann::json;
 
 // Version of the temporary files; a build does not continue from another version's.
-constexpr int kTempVersion = 8;
+constexpr int kTempVersion = 9;
 
 json jsonOf(glm::dvec3 v) { return {v.x, v.y, v.z}; }
 
@@ -155,6 +155,7 @@ std::vector<std::pair<const char*, RawBins*>> binsOf(WorkFiles& files) {
     if (files.soup) bins = {{"floats", &files.soup->floats.raw()}, {"doubles", &files.soup->doubles.raw()}};
     if (files.current) bins.emplace_back("current", &files.current->raw());
     if (files.next) bins.emplace_back("next", &files.next->raw());
+    if (files.parts) bins.emplace_back("parts", &files.parts->raw());
     if (files.waiting) bins.emplace_back("waiting", &files.waiting->raw());
     return bins;
 }

@@ -53,6 +53,18 @@ void linkChildren(std::deque<PageSpool>& levels) {
     }
 }
 
+/// Tells of each page what parts the pages below it have.
+void foldParts(std::deque<PageSpool>& levels) {
+    for (size_t level = levels.size() - 1; level > 0; --level) {
+        std::vector<PageEntry>& parents = levels[level - 1].entries();
+        auto parent = parents.begin();
+        for (const PageEntry& page : levels[level].entries()) {
+            while (parent->morton != page.morton >> 3) ++parent;
+            parent->parts |= page.parts;
+        }
+    }
+}
+
 void describeLevels(const std::deque<PageSpool>& levels, FileHeader& header) {
     header.levels = uint32_t(levels.size());
     header.pages = 0;
@@ -95,6 +107,7 @@ Result<uint64_t> assembleDataset(std::deque<PageSpool>& levels, FileHeader& head
                                  const OutputRules& rules, const std::function<bool(double)>& progress) {
     addPassages(levels);
     linkChildren(levels);
+    foldParts(levels);
     describeLevels(levels, header);
     VCP_TRY_ASSIGN(auto writer, VcpWriter::create(output, header.pages, rules));
     uint64_t done = 0;

@@ -26,6 +26,7 @@ EntryCheck::EntryCheck(const std::string& file, const Dataset& dataset)
     : file_(file),
       header_(dataset.header),
       hasColour_(dataset.hasColour()),
+      mostParts_((dataset.header.flags & kFlagParts) != 0 ? uint8_t(kPageHasClosed | kPageHasOpen) : uint8_t{0}),
       end_(blockOffset(blocksOf(dataset.header.pages))) {}
 
 Result<void> EntryCheck::check(uint64_t index, const PageEntry& e, uint32_t level) {
@@ -46,8 +47,10 @@ Result<void> EntryCheck::check(uint64_t index, const PageEntry& e, uint32_t leve
         return fail(offsetof(PageEntry, leaves), "leaf counts: more leaves than its page has room for");
     if (e.childMask == 0 && e.firstChild != 0)
         return fail(offsetof(PageEntry, firstChild), "wrong child pages: a first one where there are none");
-    for (size_t i = 0; i < sizeof e.reserved; ++i)
-        if (e.reserved[i] != 0) return fail(offsetof(PageEntry, reserved) + i, "reserved bytes must be zero");
+    if (e.reserved != 0) return fail(offsetof(PageEntry, reserved), "reserved bytes must be zero");
+    if (e.parts > mostParts_) return fail(offsetof(PageEntry, parts), "kinds of parts out of range");
+    if (e.parts == 0 && mostParts_ != 0 && e.leaves != 0)
+        return fail(offsetof(PageEntry, parts), "kinds of parts are missing");
     if (level == 0 && e.morton != 0) return fail(offsetof(PageEntry, morton), "the root is not at the origin");
     return {};
 }

@@ -35,7 +35,8 @@ private:
     const std::string& file_;
     const FileHeader& header_;
     bool hasColour_;
-    uint64_t end_;  // of what came before
+    uint8_t mostParts_;  ///< the largest PageEntry::parts
+    uint64_t end_;       // of what came before
 };
 
 /// Calls visit(page, octant) for each child, until one gives an error.

@@ -71,7 +71,8 @@ private:
                         ErrorCode::Unsupported);
         if (isPaper_ && (h_.levels != 1 || h_.pages != 1 || h_.flags != 0))
             return fail(128, "a file of this method has one page");
-        const uint32_t unknown = h_.flags & ~(kFlagColour | (h_.version > 3 ? kFlagCovering : 0));
+        const uint32_t unknown =
+            h_.flags & ~(kFlagColour | (h_.version > 3 ? kFlagCovering : 0) | (h_.version > 5 ? kFlagParts : 0));
         if (unknown != 0)
             return fail(offsetof(FileHeader, flags),
                         fmt::format("flags {:#x} are not known to this program: use a newer program", unknown),
@@ -137,6 +138,7 @@ private:
         if (h_.degenerateTriangles > h_.triangles)
             return fail(offsetof(FileHeader, degenerateTriangles), "more triangles without area than triangles");
         if (h_.hardLeaves > h_.leaves) return fail(offsetof(FileHeader, hardLeaves), "more hard leaves than leaves");
+        if (h_.closedParts > h_.parts) return fail(offsetof(FileHeader, closedParts), "more closed parts than parts");
         return {};
     }
 
@@ -161,8 +163,10 @@ private:
     /// Checks that bytes without a meaning are zero, so that a later version may give them one.
     [[nodiscard]] Result<void> rest() const {
         VCP_TRY(zero(byteOf(h_.levels), offsetof(FileHeader, hash), "rows behind the level table"));
-        return zero(offsetof(FileHeader, paper) + (isPaper_ ? offsetof(PaperParameters, reserved) : 0),
-                    kDirectoryOffset, "reserved bytes");
+        const bool hasParts = (h_.flags & kFlagParts) != 0;
+        VCP_TRY(zero(offsetof(FileHeader, paper) + (isPaper_ ? offsetof(PaperParameters, reserved) : 0),
+                     hasParts ? offsetof(FileHeader, parts) : kDirectoryOffset, "reserved bytes"));
+        return zero(sizeof(FileHeader), kDirectoryOffset, "reserved bytes");
     }
 
     [[nodiscard]] Result<void> zero(uint64_t begin, uint64_t end, const char* what) const {

@@ -1,5 +1,5 @@
-// The .vcp file, version 5. Files of versions 3 and 4 are read, too: there, pages without children are all of the
-// finest level; those of version 3 have no slab leaves and no kFlagCovering.
+// The .vcp file, version 6. Files of versions 3 to 5 are read, too: they say nothing of parts; those of versions 3 and
+// 4 have all pages without children on the finest level; those of version 3 have no slab leaves and no kFlagCovering.
 //
 // Pages without children hold the finest surface. Most are of the finest level; where triangles are few, they are of
 // coarser ones.
@@ -29,7 +29,7 @@
 
 namespace vcp {
 
-inline constexpr uint32_t kFileVersion = 5;
+inline constexpr uint32_t kFileVersion = 6;
 inline constexpr uint32_t kOldestFileVersion = 3;  ///< that is read
 inline constexpr uint32_t kMaxLevels = 22;         ///< Morton codes have 21 bits an axis
 inline constexpr uint32_t kMaxPaperLog2Cells = 20;
@@ -72,7 +72,7 @@ struct FileHeader {
     uint32_t levels = 0;  ///< 1 to kMaxLevels
     uint32_t log2Cells =
         0;               ///< cells an edge of a page: 2^log2Cells; 1 to 7, of the method Paper to kMaxPaperLog2Cells
-    uint32_t flags = 0;  ///< kFlagColour, kFlagCovering
+    uint32_t flags = 0;  ///< kFlagColour, kFlagCovering, kFlagParts
     Method method = Method::Certified;
     uint64_t triangles = 0, degenerateTriangles = 0, vertices = 0;
     uint64_t leaves = 0;      ///< soft, slab and hard leaves of the pages without children
@@ -80,18 +80,27 @@ struct FileHeader {
     LevelRow level[kMaxLevels] = {};
     uint64_t hash = 0;      ///< XXH3-64 of the 4096 bytes with this field zero
     PaperParameters paper;  ///< zero where the method is another
+    // With kFlagParts. A part is what shared vertices hold together; it is closed where each edge has an even number of
+    // triangles. Positions are as the finest level has them.
+    uint64_t parts = 0, closedParts = 0;
+    uint64_t openEdges = 0;  ///< edges with an odd number of triangles
 };
 inline constexpr uint32_t kFlagColour = 1;
 /// The surface of each page covers the mesh's within the page: no ray through the mesh slips between pages of two
 /// levels, so none is continued beyond its page.
 inline constexpr uint32_t kFlagCovering = 2;
+/// The header counts the mesh's parts, and entries say of which kinds those in a page are.
+inline constexpr uint32_t kFlagParts = 4;
+
+/// What PageEntry::parts is made of.
+inline constexpr uint8_t kPageHasClosed = 1, kPageHasOpen = 2;
 
 /// Whether a file of this version can be read.
 constexpr bool isKnownVersion(uint32_t version) { return version >= kOldestFileVersion && version <= kFileVersion; }
 static_assert(offsetof(FileHeader, origin) == 32 && offsetof(FileHeader, levels) == 128 &&
               offsetof(FileHeader, triangles) == 144);
 static_assert(offsetof(FileHeader, level) == 184 && offsetof(FileHeader, hash) == 184 + 24 * kMaxLevels &&
-              sizeof(FileHeader) == 184 + 24 * kMaxLevels + 8 + 32);
+              sizeof(FileHeader) == 184 + 24 * kMaxLevels + 8 + 32 + 24);
 
 /// One page in the directory.
 struct PageEntry {
@@ -110,7 +119,8 @@ struct PageEntry {
     float certifiedError = 0;  ///< world units, rounded up
     uint8_t childMask = 0;     ///< octants that have a page on the next level
     uint8_t level = 0;
-    uint8_t reserved[2] = {};
+    uint8_t parts = 0;  ///< with kFlagParts: the kinds of parts in it, kPageHasClosed and kPageHasOpen
+    uint8_t reserved = 0;
     uint32_t slabLeaves = 0;
 };
 static_assert(sizeof(PageEntry) == 80 && offsetof(PageEntry, firstChild) == 56 &&

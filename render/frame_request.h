@@ -11,6 +11,7 @@
 
 #include "octree/page/paper_page.h"
 #include "render/camera.h"
+#include "render/host/section_cut.h"
 
 namespace vcp {
 
@@ -78,7 +79,7 @@ struct FrameRequest {
     double errorPixels = 0.5;             ///< a page is refined where its certified error projects to more
     Shading shading;
     std::vector<SectionPlane> sections;  ///< at most kMostSections
-    bool sectionCaps = false;            ///< fills what the planes cut open; right for closed surfaces
+    Caps sectionCaps = Caps::None;       ///< without sections there are none
     bool beam = true;                    ///< beam pass; the picture is the same without it, only slower
     bool countSteps = false;             ///< fills FrameStats::steps and fetches (a slower variant)
     PaperMarch march;                    ///< march through datasets of the method `paper`

@@ -203,6 +203,11 @@ PixelHit pixelHit(const FrameRequest& request, PicturePixel pixel, double depth,
     return {.depth = depth, .position = ray.origin + ray.direction * depth, .normal = normal};
 }
 
+Caps capsOf(const FrameRequest& request, const Dataset& dataset) {
+    if (request.sections.empty()) return Caps::None;
+    return request.sectionCaps == Caps::Closed && !dataset.hasOpenParts() ? Caps::All : request.sectionCaps;
+}
+
 std::vector<uint32_t> backgroundRows(const FrameRequest& request) {
     const Shading& shading = request.shading;
     std::vector<uint32_t> rows(request.height);

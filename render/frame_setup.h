@@ -24,6 +24,9 @@ LightDirections lightDirections(const FrameRequest& request, const CameraBasis& 
 /// Whether rays of light are traced: where shading asks for them and shows light.
 bool hasLight(const Shading& shading);
 
+/// Returns how what planes cut open of a dataset is filled. Caps::Closed is for those that have open parts, and say so.
+Caps capsOf(const FrameRequest& request, const Dataset& dataset);
+
 /// Words that a pixel's hit takes: depth, normal, and where wanted colour, and light or the value of a false colour.
 uint32_t hitPlanes(const FrameRequest& request, bool colour);
 

@@ -58,7 +58,8 @@ PlacedCut placedCut(Residency& residency, ViewNumber view) {
                       .number = number,
                       .place = mortonDecode(entry.morton),
                       .level = entry.level,
-                      .error = float(double(entry.certifiedError) / dataset.header.cell)};
+                      .error = float(double(entry.certifiedError) / dataset.header.cell),
+                      .parts = entry.parts};
         if (partial == partials.end() || partial->page != number) {
             placed.pages.push_back(page);
             continue;
@@ -133,7 +134,7 @@ HostLayer layerOf(PlacedLayer& placed, const FrameRequest& request) {
             .rays = raysOf(placed.seen),
             .frame = frameConstants(placed.seen, &dataset, 1, hasColour, drawn.errorPixels, drawn.placement),
             .hasColour = hasColour,
-            .caps = request.sectionCaps,
+            .caps = capsOf(request, dataset),
             .worldPerUnit = drawn.placement.scale,
             .number = drawn.number,
             .marks = placed.marks ? &*placed.marks : nullptr};

@@ -383,7 +383,7 @@ void Viewer::toggleSection() {
     if (sections_.empty()) {
         const glm::dvec3 ahead = camera_.forwardVector();
         setSections({{ahead, glm::dot(ahead, bounds_.centre())}});
-        sectionCaps_ = true;
+        if (sectionCaps_ == Caps::None) sectionCaps_ = Caps::Closed;
     } else {
         setSections({});
     }
@@ -602,8 +602,8 @@ void Viewer::finishDraw() {
     status_.drawnPart = 1;
     status_.reduction = requestReduction_;
     status_.samples = 1;
-    const bool wantsLight =
-        request_.shading.shadows || shading_.occlusionRays > 0 || (request_.sectionCaps && !request_.sections.empty());
+    const bool wantsLight = request_.shading.shadows || shading_.occlusionRays > 0 ||
+                            (request_.sectionCaps != Caps::None && !request_.sections.empty());
     status_.without = isPaper_ && wantsLight ? "method paper: no shadows, occlusion, caps" : "";
     ++framesDrawn_;
     drawn_ = request_;

@@ -67,7 +67,7 @@ struct ViewerOptions {
     double errorPixels = 0.5;
     Shading shading;
     std::vector<SectionPlane> sections;
-    bool sectionCaps = false;
+    Caps sectionCaps = Caps::None;
     PaperMarch march;  ///< march through datasets of the method `paper`
     /// While the camera moves, frames that would take longer are drawn smaller. 0: never.
     double movingFrameMs = 50;
@@ -204,8 +204,8 @@ public:
     void setShading(const Shading& shading) { shading_ = shading; }
     [[nodiscard]] const std::vector<SectionPlane>& sections() const { return sections_; }
     void setSections(std::vector<SectionPlane> planes);
-    [[nodiscard]] bool sectionCaps() const { return sectionCaps_; }
-    void setSectionCaps(bool caps) { sectionCaps_ = caps; }
+    [[nodiscard]] Caps sectionCaps() const { return sectionCaps_; }
+    void setSectionCaps(Caps caps) { sectionCaps_ = caps; }
     /// The numbers of the datasets that are not shown, in the order of open(); empty after it.
     [[nodiscard]] const std::vector<uint32_t>& hidden() const { return hidden_; }
     void setHidden(std::vector<uint32_t> datasets) { hidden_ = std::move(datasets); }
@@ -276,7 +276,7 @@ private:
     std::vector<glm::dvec3> sectionAnchors_;  // for the planes' handles, as the planes were turned last; may be fewer
     double handleScale_ = 0;
     std::optional<SectionDrag> sectionDrag_;
-    bool sectionCaps_ = false;
+    Caps sectionCaps_ = Caps::None;
     std::vector<uint32_t> hidden_;
     glm::ivec2 size_{0};
     PictureMargins covered_;

@@ -82,15 +82,31 @@ glm::i32vec3 besideLine(glm::i32vec3 p, glm::i32vec3 q, const std::function<bool
     return p;  // a page has more than one lattice point along each axis
 }
 
+/// Returns the corners of triangles that have three, each triangle once.
+std::vector<Corners> distinctCorners(std::span<const LatticeTriangle> triangles) {
+    std::vector<std::array<Point, 3>> sorted;
+    for (const LatticeTriangle& t : triangles) {
+        std::array<Point, 3> p{pointOf(t.corner[0]), pointOf(t.corner[1]), pointOf(t.corner[2])};
+        std::sort(p.begin(), p.end());
+        if (p[0] != p[1] && p[1] != p[2]) sorted.push_back(p);
+    }
+    std::sort(sorted.begin(), sorted.end());
+    sorted.erase(std::unique(sorted.begin(), sorted.end()), sorted.end());
+    std::vector<Corners> corners;
+    for (const auto& [a, b, c] : sorted) corners.push_back({vectorOf(a), vectorOf(b), vectorOf(c)});
+    return corners;
+}
+
 }  // namespace
 
-void keepCollapsed(std::vector<LatticeTriangle>& soup, const std::function<bool(glm::i32vec3)>& owns,
-                   const std::function<bool(glm::i32vec3, glm::i32vec3)>& samePage,
-                   const std::function<int(glm::i32vec3)>& stepAt) {
+std::vector<Corners> keepCollapsed(std::vector<LatticeTriangle>& soup, const std::function<bool(glm::i32vec3)>& owns,
+                                   const std::function<bool(glm::i32vec3, glm::i32vec3)>& samePage,
+                                   const std::function<int(glm::i32vec3)>& stepAt) {
     const auto firstCollapsed = std::partition(soup.begin(), soup.end(), [](const LatticeTriangle& t) {
         return hasArea(t.corner[0], t.corner[1], t.corner[2]);
     });
-    if (firstCollapsed == soup.end()) return;
+    if (firstCollapsed == soup.end()) return {};
+    std::vector<Corners> changed = distinctCorners({firstCollapsed, soup.end()});
     std::vector<Segment> segments;
     for (auto t = firstCollapsed; t != soup.end(); ++t) addSegments(*t, segments);
     soup.erase(firstCollapsed, soup.end());
@@ -116,7 +132,9 @@ void keepCollapsed(std::vector<LatticeTriangle>& soup, const std::function<bool(
         const int step = std::max(stepAt(vectorOf(s.a)), stepAt(vectorOf(s.b)));
         t.stray = std::max(s.stray, float(kLatticeRounding * step)) + float(step) / float(kLatticePerCell);
         soup.push_back(t);
+        changed.push_back({t.corner[0], t.corner[1], t.corner[2]});
     }
+    return changed;
 }
 
 }  // namespace vcp

@@ -207,6 +207,15 @@ std::vector<uint32_t> meanColours(std::span<const LatticeTriangle> soup, const s
     return means;
 }
 
+/// Returns the part of each vertex, that of any triangle there; nothing where all are closed.
+std::vector<uint32_t> partsOf(std::span<const LatticeTriangle> soup, const std::vector<uint32_t>& corners,
+                              size_t vertices) {
+    if (std::ranges::all_of(soup, [](const LatticeTriangle& t) { return t.part == kClosedPart; })) return {};
+    std::vector<uint32_t> parts(vertices);
+    for (size_t k = 0; k < corners.size(); ++k) parts[corners[k]] = std::max(parts[corners[k]], soup[k / 3].part);
+    return parts;
+}
+
 }  // namespace
 
 bool hasArea(glm::i32vec3 a, glm::i32vec3 b, glm::i32vec3 c) {
@@ -233,6 +242,7 @@ LatticeMesh meshOf(std::span<const LatticeTriangle> soup, bool withColour) {
     for (size_t k = 0; k < corners.size(); ++k)
         mesh.normals[corners[k]] = std::min(mesh.normals[corners[k]], soup[k / 3].normal[k % 3]);
     if (withColour) mesh.colours = meanColours(soup, corners, mesh.positions.size());
+    mesh.parts = partsOf(soup, corners, mesh.positions.size());
     sortTriangles(soup, corners, mesh);
     return mesh;
 }

@@ -20,7 +20,8 @@ struct LatticeMesh {
     std::vector<uint32_t> colours;                   ///< RGBA8, as many as positions, or empty
     std::vector<uint32_t> normals;                   ///< packNormal with crease flag, as many as positions
     std::vector<std::array<uint32_t, 3>> triangles;  ///< none without area, none twice
-    std::vector<float> stray;  ///< cells, one a triangle: how far its points may be from the mesh's, both ways
+    std::vector<float> stray;     ///< cells, one a triangle: how far its points may be from the mesh's, both ways
+    std::vector<uint32_t> parts;  ///< that vertices belong to, as many as positions; empty: kClosedPart
 };
 
 /// Rounding a point to the lattice moves it at most so far, in cells.

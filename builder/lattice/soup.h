@@ -20,13 +20,18 @@ struct WorldTriangle {
 };
 static_assert(sizeof(WorldTriangle<float>) == 80 && sizeof(WorldTriangle<double>) == 120);
 
+/// Parts of a mesh that are known to be closed or open, and the first number of those that are not known yet
+/// (builder/level/closed_parts.h).
+inline constexpr uint32_t kClosedPart = 0, kOpenPart = 1, kFirstUndecidedPart = 2;
+
 /// A triangle on a level's lattice.
 struct LatticeTriangle {
     glm::i32vec3 corner[3];
     uint32_t colour[3];
     uint32_t normal[3];  ///< packNormal with crease flag; unknown before the vertices' pass
     float stray;         ///< cells: how far its points may be from the mesh's, both ways
+    uint32_t part = 0;   ///< that it belongs to: unknown before the vertices' pass, and on coarser levels
 };
-static_assert(sizeof(LatticeTriangle) == 64);
+static_assert(sizeof(LatticeTriangle) == 68);
 
 }  // namespace vcp

@@ -152,6 +152,7 @@ Result<void> LevelStep::stepLong(size_t bin, const LatticeMesh& mesh, const Imag
         if (!first_ && !isLong(mesh.positions[v[0]], mesh.positions[v[1]], mesh.positions[v[2]])) return {};
         WaitingTriangle w{};
         w.from.stray = mesh.stray[k];
+        if (!mesh.parts.empty()) w.from.part = mesh.parts[v[0]];
         for (int i = 0; i < 3; ++i) {
             w.from.corner[i] = mesh.positions[v[i]];
             if (!images.known[v[i]]) continue;

@@ -60,7 +60,7 @@ struct HostLayer {
     PictureRays rays;               ///< in the dataset's own space
     frame::FrameConstants frame;    ///< as the shaders get it
     bool hasColour = false;         ///< hits have colours
-    bool caps = false;              ///< fills what the section planes of the rays cut open
+    Caps caps = Caps::None;         ///< fills what the section planes of the rays cut open
     double worldPerUnit = 1;        ///< world units per unit of the dataset's own
     uint32_t number = 0;            ///< of the dataset in the picture
     PictureMarks* marks = nullptr;  ///< where given, gets the pages that rays hit; one for each page of the scene

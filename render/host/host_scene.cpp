@@ -39,6 +39,7 @@ Result<HostScene> HostScene::create(const PageCache& cache, std::span<const uint
         const PageEntry& entry = cache.dataset().pages[number];
         page.place = mortonDecode(entry.morton);
         page.level = entry.level;
+        page.parts = entry.parts;
         page.error = float(double(entry.certifiedError) / header.cell);
         pages.push_back(page);
     }
@@ -91,7 +92,7 @@ Result<void> HostScene::add(const HostPage& page) {
     const uint32_t root = page.view->header.root;
     pages_.push_back({page.view, page.number, page.octant,
                       page.octant ? page.view->nodes[8 * (root & kNodePayloadMask) + part] : root,
-                      page.place << (rootBits() - page.level), grid_.levels - 1 - page.level, page.error});
+                      page.place << (rootBits() - page.level), grid_.levels - 1 - page.level, page.error, page.parts});
     return {};
 }
 

@@ -33,6 +33,7 @@ struct HostPage {
     float error = 0;      ///< certified error, finest cells
     /// Only this octant is drawn. Precondition: the page's root is an internal node.
     std::optional<uint32_t> octant = {};
+    uint8_t parts = 0;  ///< as PageEntry's
 };
 
 /// An immutable tree down to the pages of a cut. Any thread may read it.
@@ -54,6 +55,7 @@ public:
         glm::uvec3 corner;               ///< of the whole page; subcells
         uint32_t cellBits;               ///< log2 of the edge of a cell of its level in finest cells
         float error;                     ///< certified error, finest cells
+        uint8_t parts;                   ///< as PageEntry's
     };
     /// A child of the tree: nothing, another node, or a page.
     struct Child {

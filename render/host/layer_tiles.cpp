@@ -45,7 +45,7 @@ LayerTiles::LayerTiles(const HostLayer& layer, glm::ivec2 size)
 
 void LayerTiles::cast(TileHits& hits) const {
     castTile(layer_.scene, layer_.rays, hits);
-    if (layer_.caps) castCaps(layer_.scene, layer_.rays, hits, cameraMarks());
+    if (layer_.caps != Caps::None) castCaps(layer_.scene, layer_.rays, layer_.caps, hits, cameraMarks());
     if (layer_.marks != nullptr) markPages(hits);
 }
 

@@ -20,11 +20,14 @@ namespace vcp::HWY_NAMESPACE {
 // These are as in trace.comp, which says what they are for.
 constexpr int kMostCrossings = 64;
 constexpr float kPastHit = 0.15f, kOneSheetCosine = 0.6f, kOneSheetCells = 0.6f;
+constexpr double kLinePixels = 1, kLeastCosine = 1e-3;
 
 /// Counts the walls that rays cross.
 class WallCounter {
 public:
-    WallCounter(const HostScene& scene, PageMarks* marks) : scene_(scene), caster_(scene, marks) {}
+    /// `ofClosed`: pages of open parts have no walls.
+    WallCounter(const HostScene& scene, bool ofClosed, PageMarks* marks)
+        : scene_(scene), ofClosed_(ofClosed), caster_(scene, marks) {}
 
     /// Returns a wall behind a point where the point is inside of the solid: an odd number of walls lies behind. Two of
     /// three rays decide, for one may graze a wall. `direction`: unit.
@@ -41,6 +44,15 @@ public:
         return inside == 2 ? wall : std::nullopt;
     }
 
+    /// Returns the first wall between two points, if its page has open parts.
+    std::optional<WalkEntry> openBetween(glm::dvec3 from, glm::dvec3 to) {
+        const auto length = float(glm::distance(from, to));
+        caster_.begin(from, glm::vec3(glm::normalize(to - from)), length);
+        if (!(caster_.next(0) <= length)) return std::nullopt;
+        const WalkEntry& leaf = caster_.hitLeaf();
+        return (scene_.page(leaf.page).parts & kPageHasOpen) != 0 ? std::optional(leaf) : std::nullopt;
+    }
+
 private:
     /// `first` gets the first wall that any ray crosses.
     int crossings(glm::dvec3 point, glm::vec3 direction, std::optional<WalkEntry>& first) {
@@ -52,9 +64,14 @@ private:
             const float distance = caster_.next(from);
             if (!(distance < RayCaster::kNothing)) break;
             const WalkEntry& leaf = caster_.hitLeaf();
-            if (!first) first = leaf;
             const HostScene::Page& page = scene_.page(leaf.page);
             const auto cell = float(1u << page.cellBits);
+            if (ofClosed_ && page.parts == kPageHasOpen) {
+                gap += distance - from + kPastHit * cell;
+                from = distance + kPastHit * cell;
+                continue;
+            }
+            if (!first) first = leaf;
             const glm::vec3 normal = slabNormal(*page.view, leaf.word);
             const bool isSameSheet =
                 std::abs(glm::dot(normal, before)) > kOneSheetCosine &&
@@ -73,8 +90,36 @@ private:
     }
 
     const HostScene& scene_;
+    bool ofClosed_;
     RayCaster caster_;
 };
+
+/// A point of a section plane that a ray enters by.
+struct Entrance {
+    glm::dvec2 pixel;   ///< of the ray
+    glm::dvec3 point;   ///< world
+    glm::dvec3 normal;  ///< of the plane
+};
+
+/// Returns the point of the entrance's plane that is seen at another pixel; none where the plane is seen from its edge.
+std::optional<glm::dvec3> inPlane(const PictureRays& rays, const Entrance& at, glm::dvec2 pixel) {
+    const glm::dvec3 origin = rays.originAt(pixel.x, pixel.y),
+                     direction = glm::normalize(rays.directionAt(pixel.x, pixel.y));
+    const double along = glm::dot(at.normal, direction);
+    if (along < kLeastCosine) return std::nullopt;
+    return origin + glm::dot(at.normal, at.point - origin) / along * direction;
+}
+
+/// Returns a wall of an open surface whose cut is so near in the picture that its line covers the entrance.
+std::optional<WalkEntry> lineAt(WallCounter& walls, const HostGrid& grid, const PictureRays& rays, const Entrance& at) {
+    for (const glm::dvec2 aside : {glm::dvec2(kLinePixels, 0), glm::dvec2(0, kLinePixels)}) {
+        const auto from = inPlane(rays, at, at.pixel - aside), to = inPlane(rays, at, at.pixel + aside);
+        if (!from || !to) continue;
+        if (const auto wall = walls.openBetween((*from - grid.origin) / grid.cell, (*to - grid.origin) / grid.cell))
+            return wall;
+    }
+    return std::nullopt;
+}
 
 void setCap(TileHits& hits, int i, double depth, glm::dvec3 normal, const WalkEntry& wall) {
     if (!hits.any) {
@@ -90,8 +135,9 @@ void setCap(TileHits& hits, int i, double depth, glm::dvec3 normal, const WalkEn
     hits.leaf[i] = uint32_t(hits.leaves.size() - 1);
 }
 
-void castCapsHere(const HostScene& scene, const PictureRays& rays, TileHits& hits, PageMarks* marks) {
-    WallCounter walls(scene, marks);
+void castCapsHere(const HostScene& scene, const PictureRays& rays, Caps caps, TileHits& hits, PageMarks* marks) {
+    const bool ofClosed = caps == Caps::Closed;
+    WallCounter walls(scene, ofClosed, marks);
     for (int i = 0; i < kTilePixels; ++i) {
         const glm::ivec2 in(i % kTileWidth, i / kTileWidth);
         if (in.x >= hits.size.x || in.y >= hits.size.y) continue;
@@ -99,9 +145,11 @@ void castCapsHere(const HostScene& scene, const PictureRays& rays, TileHits& hit
         const glm::dvec3 origin = rays.originAt(at.x, at.y), direction = glm::normalize(rays.directionAt(at.x, at.y));
         const KeptInterval kept = keptInterval(rays.sections, origin, direction);
         if (kept.begin == nullptr) continue;
-        const glm::dvec3 point = origin + kept.first * direction - scene.grid().origin;
-        if (const auto wall = walls.wallBehind(point / scene.grid().cell, glm::vec3(direction)))
-            setCap(hits, i, kept.first, -glm::dvec3(*kept.begin), *wall);
+        const Entrance entrance{at, origin + kept.first * direction, glm::dvec3(*kept.begin)};
+        const glm::dvec3 point = entrance.point - scene.grid().origin;
+        auto wall = walls.wallBehind(point / scene.grid().cell, glm::vec3(direction));
+        if (!wall && ofClosed) wall = lineAt(walls, scene.grid(), rays, entrance);
+        if (wall) setCap(hits, i, kept.first, -glm::dvec3(*kept.begin), *wall);
     }
 }
 
@@ -113,8 +161,8 @@ namespace vcp {
 
 HWY_EXPORT(castCapsHere);
 
-void castCaps(const HostScene& scene, const PictureRays& rays, TileHits& hits, PageMarks* marks) {
-    if (!rays.sections.empty()) HWY_DYNAMIC_DISPATCH(castCapsHere)(scene, rays, hits, marks);
+void castCaps(const HostScene& scene, const PictureRays& rays, Caps caps, TileHits& hits, PageMarks* marks) {
+    if (!rays.sections.empty()) HWY_DYNAMIC_DISPATCH(castCapsHere)(scene, rays, caps, hits, marks);
 }
 
 }  // namespace vcp

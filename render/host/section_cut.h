@@ -1,7 +1,8 @@
-// Section planes: which interval of a ray they leave (render/shaders/sections.glsl).
+// Section planes: what is filled where they cut, and which interval of a ray they leave (render/shaders/sections.glsl).
 #pragma once
 
 #include <algorithm>
+#include <cstdint>
 #include <limits>
 #include <span>
 #include <vector>
@@ -11,6 +12,14 @@
 #include <glm/vec4.hpp>
 
 namespace vcp {
+
+/// What is filled where section planes cut.
+enum class Caps : uint8_t {
+    None,
+    Closed,  ///< closed parts (kFlagParts); surfaces that are open show as lines. Files that say nothing of parts: as
+             ///< All
+    All,     ///< whatever has an odd number of walls behind it; right for closed surfaces
+};
 
 /// A section plane: what has dot(xyz, p) >= w is kept. |xyz| = 1.
 using SectionCut = glm::dvec4;

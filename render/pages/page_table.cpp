@@ -43,11 +43,16 @@ Parts partsOf(const Dataset& dataset, std::span<const uint64_t> cut, std::span<c
     return parts;
 }
 
-frame::TableRecord recordOf(const ResidentPage& page, uint64_t entry, float errorCells) {
+uint32_t partFlags(uint8_t parts) {
+    return ((parts & kPageHasOpen) != 0 ? frame::kRecordHasOpen : 0u) |
+           (parts == kPageHasOpen ? frame::kRecordIsOpen : 0u);
+}
+
+frame::TableRecord recordOf(const ResidentPage& page, uint64_t entry, uint8_t parts, float errorCells) {
     const PageSections sections = pageSections(page.header);
     const auto texelOf = [&](uint64_t byte) { return page.texel + uint32_t(byte / 16); };
     const uint32_t error = (std::bit_cast<uint32_t>(errorCells) + ~frame::kRecordErrorMask) & frame::kRecordErrorMask;
-    return {.node = {.flags = frame::kRecordResident | error,
+    return {.node = {.flags = frame::kRecordResident | partFlags(parts) | error,
                      .firstChild = 0,
                      .root = page.header.root,
                      .pageTexel = page.texel},
@@ -63,8 +68,9 @@ frame::TableRecord recordOf(const ResidentPage& page, uint64_t entry, float erro
 
 frame::TableRecord octantOf(const Dataset& dataset, const frame::TableRecord& page, uint32_t octant, uint32_t root) {
     frame::TableRecord record = page;
-    record.node.flags = (page.node.flags & frame::kRecordErrorMask) | frame::kRecordResident | frame::kRecordInCut |
-                        frame::kRecordIsOctant;
+    constexpr uint32_t kKept = frame::kRecordErrorMask | frame::kRecordHasOpen | frame::kRecordIsOpen;
+    record.node.flags =
+        (page.node.flags & kKept) | frame::kRecordResident | frame::kRecordInCut | frame::kRecordIsOctant;
     record.node.firstChild = 0;
     record.node.root = root;
     record.colours.asked = uint32_t(childIn(dataset.pages[page.colours.entry], octant));
@@ -95,7 +101,8 @@ std::vector<frame::TableRecord> pageTable(const Dataset& dataset, std::span<cons
         frame::TableRecord record{};
         const PageEntry& entry = dataset.pages[page];
         const auto resident = pageOf(page);
-        if (resident) record = recordOf(*resident, page, float(double(entry.certifiedError) / dataset.header.cell));
+        if (resident)
+            record = recordOf(*resident, page, entry.parts, float(double(entry.certifiedError) / dataset.header.cell));
         if (partOf(parts, page) == Part::Cut) {
             record.node.flags |= frame::kRecordInCut;
             table.push_back(record);

@@ -7,8 +7,8 @@
 
 namespace vcp {
 
-/// Whether section planes cut, and whether what they cut open is filled.
-enum class SectionKind : uint32_t { None, Open, Capped };
+/// Whether section planes cut, and what of what they cut open is filled: all of it, or closed parts.
+enum class SectionKind : uint32_t { None, Open, Capped, ClosedCapped };
 
 class TracePass {
 public:

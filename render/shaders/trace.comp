@@ -12,7 +12,8 @@ const uint kHitBy = kHitByCamera;
 #include "render/shaders/sections.glsl"
 #include "render/shaders/hit_records.glsl"
 
-layout(constant_id = 6) const uint kSections = 0u;  // 0: none; 1: planes that cut; 2: with filled caps
+layout(constant_id = 6) const uint kSections =
+    0u;  // 0: none; 1: planes that cut; 2: with filled caps; 3: of closed parts
 layout(local_size_x = 8, local_size_y = 8) in;
 
 const uint kMostCrossings = 64u;
@@ -44,6 +45,16 @@ bool isNewWall(Hit hit, float cell, vec3 direction, inout Wall before) {
     return !isSame;
 }
 
+// Half the width of the line in which an open surface is cut, in pixels.
+const float kLinePixels = 1.0;
+// Planes that are seen from so near their edge, as a cosine, show no such lines.
+const float kLeastCosine = 1e-3;
+
+// Whether a hit's page has one of these kinds of parts (kRecordHasOpen, kRecordIsOpen).
+bool hasParts(Hit hit, uint kind) {
+    return kSections == 3u && hit.depth < kNoHit && (fetchTableNode(hit.record).flags & kind) != 0u;
+}
+
 // Whether a point in a section plane, the ray's origin, is inside of the solid: an odd number of walls lies
 // behind. Two of three rays decide, for one may graze a wall.
 bool isInside(Ray ray, inout Work work) {
@@ -61,7 +72,10 @@ bool isInside(Ray ray, inout Work work) {
             Hit wall = castRay(onward, 0.0, kNoHit, work);
             open = wall.depth < kNoHit;
             float cell = powerOfTwo(int(frame.finestLevel) + wall.pageBits - int(kLatticeBits));
-            crossings += open && isNewWall(wall, cell, onward.direction, before) ? 1u : 0u;
+            if (hasParts(wall, kRecordIsOpen))
+                before.gap += wall.depth + kPastHit * cell;
+            else
+                crossings += open && isNewWall(wall, cell, onward.direction, before) ? 1u : 0u;
             onward = movedAlong(onward, open ? wall.depth + kPastHit * cell : 0.0);
         }
         inside += crossings & 1u;
@@ -70,19 +84,53 @@ bool isInside(Ray ray, inout Work work) {
     return inside == 2u;
 }
 
-// Finds the first hit in what the section planes leave, and on the caps.
-Hit castCut(Ray ray, Interval kept, float from, inout bool onCap, inout Work work) {
+// Finds the point of the plane through `place` that is seen at a point of the picture. Returns false where the plane is
+// seen from its edge. `normal`: towards the eye.
+bool findInPlane(vec2 point, vec3 place, vec3 normal, out vec3 found) {
+    Ray ray = rayAt(point);
+    float along = dot(normal, ray.direction);
+    found = ray.origin + dot(normal, place - ray.origin) / min(along, -kLeastCosine) * ray.direction;
+    return along < -kLeastCosine;
+}
+
+// Finds the cut of an open surface that is so near in the picture to a point of a section plane that its line covers
+// it. `pixel`: where that is seen.
+bool findLine(vec2 pixel, vec3 place, vec3 normal, out Hit hit, inout Work work) {
+    bool found = false;
+    for (int axis = 0; !found && axis < 2; axis++) {
+        vec2 aside = axis == 0 ? vec2(kLinePixels, 0.0) : vec2(0.0, kLinePixels);
+        vec3 from, to;
+        bool isSeen = findInPlane(pixel - aside, place, normal, from);
+        isSeen = findInPlane(pixel + aside, place, normal, to) && isSeen;
+        float reach = distance(from, to);
+        Ray along;
+        along.origin = from;
+        along.direction = withoutZeros((to - from) / max(reach, 1e-30));
+        along.inverse = 1.0 / along.direction;
+        hit = castRay(along, 0.0, reach, work);
+        found = isSeen && hit.depth <= reach && hasParts(hit, kRecordHasOpen);
+    }
+    return found;
+}
+
+// Finds the first hit in what the section planes leave, and on the caps. `pixel`: where the ray is seen.
+Hit castCut(Ray ray, vec2 pixel, Interval kept, float from, inout bool onCap, inout Work work) {
     Ray rest = movedAlong(ray, kept.first);
     float last = kept.last - kept.first;
     // Where pages are marked, rays are to begin in those that the plane cuts.
     float start = frame.firstHitMark != 0u ? 0.0 : max(from - kept.first, 0.0);
     Hit hit = castRay(rest, start, last, work);
     if (hit.depth > last) hit.depth = kNoHit;
-    if (kSections == 2u) {
+    if (kSections >= 2u) {
         // This loop runs once; a device that skips nothing skips it where no ray enters through a plane.
         bool entering = kept.first > 0.0 && kept.first < kept.last;
         while (entering) {
             onCap = isInside(rest, work);
+            Hit line;
+            if (kSections == 3u && !onCap && findLine(pixel, rest.origin, kept.plane, line, work)) {
+                hit = line;
+                onCap = true;
+            }
             entering = false;
         }
         if (onCap) hit.depth = 0.0;
@@ -119,7 +167,7 @@ void main() {
         surface = surfaceAt(hit, ray.direction);
     } else {
         Interval kept = keptInterval(ray);
-        hit = castCut(ray, kept, from, onCap, work);
+        hit = castCut(ray, vec2(pixel) + 0.5, kept, from, onCap, work);
         surface = surfaceAt(hit, ray.direction);
         if (onCap) surface.normal = kept.plane;
     }

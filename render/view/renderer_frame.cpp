@@ -119,6 +119,17 @@ Result<void> Renderer::View::prepare(Frame& frame, size_t i) {
     return choosePipelines(frame, i);
 }
 
+namespace {
+
+SectionKind sectionKind(const FrameRequest& request, Caps caps) {
+    if (request.sections.empty()) return SectionKind::None;
+    return caps == Caps::None     ? SectionKind::Open
+           : caps == Caps::Closed ? SectionKind::ClosedCapped
+                                  : SectionKind::Capped;
+}
+
+}  // namespace
+
 Result<void> Renderer::View::choosePipelines(Frame& frame, size_t i) {
     const Layer& layer = layers[i];
     LayerFrame& drawing = frame.layers[i];
@@ -131,9 +142,8 @@ Result<void> Renderer::View::choosePipelines(Frame& frame, size_t i) {
         VCP_TRY(shared->accumulate.prepare(resources, constants));
     }
     VCP_TRY(shared->beam.prepare(resources, constants, request.beam));
-    const SectionKind sections = request.sections.empty() ? SectionKind::None
-                                 : request.sectionCaps    ? SectionKind::Capped
-                                                          : SectionKind::Open;
+    const Caps caps = layer.residency != nullptr ? capsOf(request, layer.residency->dataset()) : Caps::None;
+    const SectionKind sections = sectionKind(request, caps);
     if (layer.isPaper())
         VCP_TRY(shared->paperTrace.prepare(resources, constants, sections != SectionKind::None, request.march));
     else
@@ -241,7 +251,8 @@ Result<void> Renderer::View::recordSurfaces(VkCommandBuffer commands, Frame& fra
 FrameRequest Renderer::View::Layer::drawable(const FrameRequest& wanted) const {
     FrameRequest request = requestIn(placement, wanted);
     if (!isPaper()) return request;
-    request.beam = request.sectionCaps = request.shading.shadows = false;
+    request.beam = request.shading.shadows = false;
+    request.sectionCaps = Caps::None;
     request.shading.occlusionRays = 0;
     return request;
 }

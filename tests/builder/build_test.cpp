@@ -90,6 +90,39 @@ protected:
     TestFolder folder_{"vcp_build_test"};
 };
 
+/// Two closed parts and an open one, far apart.
+IndexedMesh closedAndOpen() {
+    IndexedMesh mesh = scene();
+    test::append(mesh, test::sphereMesh({-6, 0, 0}, 1.5, 40));
+    mesh.triangles.pop_back();
+    mesh.triangles.resize(mesh.triangles.size() - 300);
+    return mesh;
+}
+
+TEST_F(Build, SaysWhichPartsAreClosed) {
+    BuildOptions o = options({ply(closedAndOpen())});
+    o.cell = 0.04;
+    ASSERT_TRUE(buildOctree(o).ok());
+    const Dataset built = dataset();
+    EXPECT_TRUE(built.hasParts());
+    EXPECT_EQ(built.header.parts, 3u);
+    EXPECT_EQ(built.header.closedParts, 2u);
+    EXPECT_GT(built.header.openEdges, 10u);
+    EXPECT_EQ(built.pages[0].parts, kPageHasClosed | kPageHasOpen);
+    uint64_t closed = 0, open = 0;
+    for (uint64_t i = 0; i < built.header.pages; ++i) {
+        const PageEntry& page = built.pages[i];
+        if (page.childMask != 0) continue;
+        const double low = built.originOf(page).x, high = low + built.edgeOf(page);
+        EXPECT_TRUE(high > -4.4 || page.parts == kPageHasOpen) << i;
+        EXPECT_TRUE(low < -4.4 || page.parts == kPageHasClosed) << i;
+        ++(page.parts == kPageHasOpen ? open : closed);
+    }
+    EXPECT_GT(closed, 3u);
+    EXPECT_GT(open, 0u);
+    expectIntact();
+}
+
 TEST_F(Build, SameBytesForAnyThreads) {
     const fs::path input = ply(scene());
     std::string first;
@@ -108,6 +141,8 @@ TEST_F(Build, SameBytesForAnyThreads) {
 IndexedMesh largeScene() {
     IndexedMesh mesh = test::torusMesh({0.3, 0.2, 0.1}, 2, 0.7, 400, 200);
     for (glm::dvec3& p : mesh.positions) p *= 1 + 0.02 * std::sin(9 * p.x) * std::cos(7 * p.y);
+    // The hole is in one bin, and the torus in all.
+    mesh.triangles.pop_back();
     test::append(mesh, test::boxMesh({3, -1, -1}, {4, 1, 1}, 12));
     // Long triangles, far from the corners of most bins.
     test::append(mesh, test::boxMesh({-3, -3, -1.2}, {3, 3, -1.1}, 1));
@@ -128,6 +163,10 @@ TEST_F(Build, SameBytesForAnyMemory) {
         const std::string bytes = contentOf(o.output);
         if (first.empty()) first = bytes;
         EXPECT_TRUE(bytes == first) << megabytes << " MiB";
+        const FileHeader header = dataset().header;
+        EXPECT_EQ(header.parts, 3u);
+        EXPECT_EQ(header.closedParts, 2u);
+        EXPECT_EQ(header.openEdges, 3u);
         EXPECT_FALSE(fs::exists(tempFolderOf(o)));
     }
     BuildOptions o = options({input});

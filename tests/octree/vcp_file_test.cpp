@@ -247,7 +247,7 @@ TEST(VcpFileLayout, GoldenBytes) {
     };
     ASSERT_EQ(bytes.size(), 9792u);
     EXPECT_EQ(std::memcmp(bytes.data(), "VCP\r\n\x1a\n\0", 8), 0);
-    EXPECT_EQ(u32(8), 5u);
+    EXPECT_EQ(u32(8), 6u);
     EXPECT_EQ(u32(12), 4096u);
     EXPECT_EQ(u64(16), 9792u);
     EXPECT_EQ(u64(24), 2u);
@@ -261,10 +261,14 @@ TEST(VcpFileLayout, GoldenBytes) {
     EXPECT_EQ(u64(4096 + 80), 5u);  // Morton code of the second
     EXPECT_EQ(u64(4096 + 80 + 8), 8960u);
     EXPECT_EQ(std::memcmp(&bytes[9728], "VCPcommt", 8), 0);
-    EXPECT_EQ(fmt::format("{:016x}", hashBytes(bytes)), "5db7b605bec65f26");
+    EXPECT_EQ(fmt::format("{:016x}", hashBytes(bytes)), "3059bebac63681a7");
     EXPECT_TRUE(readDataset(MemoryFile(bytes)).ok());
-    // A file of version 3 differs in nothing else, and is read.
+    // Files of versions 5 and 3 differ in nothing else, and are read.
     Forgery older{bytes};
+    older.header().version = 5;
+    older.seal();
+    EXPECT_EQ(fmt::format("{:016x}", hashBytes(older.bytes)), "5db7b605bec65f26");
+    EXPECT_TRUE(readDataset(MemoryFile(older.bytes)).ok());
     older.header().version = 3;
     older.seal();
     EXPECT_EQ(fmt::format("{:016x}", hashBytes(older.bytes)), "dbd0f29632bee815");
@@ -355,7 +359,7 @@ TEST_F(VcpFile, WrongMagicAndVersion) {
     EXPECT_EQ(past.error().code, ErrorCode::Unsupported);
     EXPECT_EQ(
         past.error().line(),
-        "memory.vcp: header: byte 8: file version 2 is not known; this program reads versions 3 to 5: build it again");
+        "memory.vcp: header: byte 8: file version 2 is not known; this program reads versions 3 to 6: build it again");
 }
 
 TEST_F(VcpFile, HeaderLiesAreFound) {
@@ -403,18 +407,18 @@ TEST_F(VcpFile, HeaderLiesAreFound) {
                   [](F& f) { f.header().hardLeaves = f.header().leaves + 1; });
     expectRefused(fmt::format("byte {}: more triangles without area", offsetof(FileHeader, degenerateTriangles)),
                   [](F& f) { f.header().degenerateTriangles = 1; });
-    expectRefused("byte 752: reserved", [](F& f) { f.bytes[sizeof(FileHeader)] = std::byte{1}; });
+    expectRefused("byte 776: reserved", [](F& f) { f.bytes[sizeof(FileHeader)] = std::byte{1}; });
     expectRefused("byte 4095: reserved", [](F& f) { f.bytes[4095] = std::byte{1}; });
     expectRefused("reserved", [](F& f) { f.header().paper.packing = 1; });
     expectRefused("rows behind the level table", [](F& f) { f.header().level[2].pages = 1; });
     Forgery flags{bytes_};
-    flags.header().flags |= 4;
+    flags.header().flags |= 8;
     flags.seal();
     const auto dataset = readDataset(MemoryFile(flags.bytes));
     ASSERT_FALSE(dataset.ok());
     EXPECT_EQ(dataset.error().code, ErrorCode::Unsupported);
     EXPECT_EQ(dataset.error().line(),
-              "memory.vcp: header: byte 136: flags 0x4 are not known to this program: use a newer program");
+              "memory.vcp: header: byte 136: flags 0x8 are not known to this program: use a newer program");
 
     // Version 3 knows fewer flags.
     Forgery covering{bytes_};
@@ -426,6 +430,29 @@ TEST_F(VcpFile, HeaderLiesAreFound) {
     covering.header().version = 3;
     covering.seal();
     EXPECT_FALSE(readDataset(MemoryFile(covering.bytes)).ok());
+}
+
+TEST_F(VcpFile, WhatIsSaidOfPartsIsChecked) {
+    const auto say = [](Forgery& f) {
+        f.header().flags |= kFlagParts;
+        f.header().parts = 3, f.header().closedParts = 2, f.header().openEdges = 40;
+        for (uint64_t i = 0; i < f.header().pages; ++i) f.entry(i).parts = kPageHasClosed | kPageHasOpen;
+    };
+    Forgery said{bytes_};
+    say(said);
+    said.seal();
+    const auto knows = readDataset(MemoryFile(said.bytes));
+    ASSERT_TRUE(knows.ok()) << knows.error().line();
+    EXPECT_TRUE(knows->hasOpenParts());
+    expectRefused("more closed parts", [&](Forgery& f) { say(f), f.header().closedParts = 4; });
+    expectRefused("out of range", [&](Forgery& f) { say(f), f.entry(1).parts = 4; });
+    expectRefused("parts are missing", [&](Forgery& f) { say(f), f.entry(1).parts = 0; });
+    expectRefused("out of range", [](Forgery& f) { f.entry(1).parts = 1; });
+    expectRefused("reserved", [](Forgery& f) { f.header().openEdges = 1; });
+    // Version 5 knows nothing of parts.
+    said.header().version = 5;
+    said.seal();
+    EXPECT_FALSE(readDataset(MemoryFile(said.bytes)).ok());
 }
 
 TEST_F(VcpFile, HugeCountsAllocateNothing) {
@@ -488,7 +515,7 @@ TEST_F(VcpFile, DirectoryLiesAreFound) {
     expectRefused(at(1, offsetof(PageEntry, certifiedError)) + "certified error is larger",
                   [](F& f) { f.header().level[1].certifiedError = f.header().certifiedErrorMax = 0; });
     expectRefused(at(2, offsetof(PageEntry, leaves)) + "leaf counts", [](F& f) { f.entry(2).leaves = 0xffffffff; });
-    expectRefused(at(3, offsetof(PageEntry, reserved) + 1) + "reserved", [](F& f) { f.entry(3).reserved[1] = 1; });
+    expectRefused(at(3, offsetof(PageEntry, reserved)) + "reserved", [](F& f) { f.entry(3).reserved = 1; });
     expectRefused(at(0, offsetof(PageEntry, colourStoredBytes)) + "has colour", [](F& f) { f.header().flags = 0; });
     expectRefused(at(0, offsetof(PageEntry, colourOffset)) + "a place of colour", [](F& f) {
         f.header().flags = 0;

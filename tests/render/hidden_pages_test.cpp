@@ -99,7 +99,7 @@ TEST_P(HiddenPages, SectionsOpenWhatIsBehindThem) {
             SCOPED_TRACE(cameras[camera].name + std::string(caps ? ", caps" : ""));
             FrameRequest request = requestOf(cameras[camera].camera);
             request.sections = {{{0.2, 0.3, -1}, -0.25}};
-            request.sectionCaps = caps;
+            request.sectionCaps = caps ? Caps::Closed : Caps::None;
             expectTheSame(request);
         }
 }

@@ -154,7 +154,7 @@ TEST_F(PaperTrace, OnlyItsOwnPassesAreMade) {
     const Picture plain = *renderer_->readPicture();
     request.shading.shadows = true;
     request.shading.occlusionRays = 4;
-    request.sectionCaps = true;
+    request.sectionCaps = Caps::Closed;
     EXPECT_EQ(draw(request).pipelines, 3u);
     EXPECT_EQ(*renderer_->readPicture(), plain);
     // The half behind a plane is gone.

@@ -93,7 +93,7 @@ TEST_F(ShadingTest, LightAndSectionsCostNothingWhenOff) {
     request.shading = {};
     request.sections = {{{1, 0, 0}, scene.boxMin.x}};
     EXPECT_EQ(draw(request).pipelines, 6u);
-    request.sectionCaps = true;
+    request.sectionCaps = Caps::Closed;
     EXPECT_EQ(draw(request).pipelines, 7u);
     request.sections.clear();
     EXPECT_EQ(draw(request).pipelines, 7u);
@@ -118,7 +118,7 @@ TEST_F(ShadingTest, SectionsShowTheFarWallOrTheCap) {
         EXPECT_NEAR((*open)->depth, request.camera.eye.z - (centre.z - radius), 0.02 * radius);
         EXPECT_GT((*open)->normal.z, 0.9f);
 
-        request.sectionCaps = true;
+        request.sectionCaps = Caps::Closed;
         const Picture capped = pictureOf(request);
         const auto cap = renderer_->pick(kWidth / 2, kHeight / 2);
         ASSERT_TRUE(cap && *cap);

@@ -669,7 +669,7 @@ TEST_F(ViewerTest, StatusLineKeepsToItsRoom) {
 TEST_F(ViewerTest, CapsArePickedOnThePlane) {
     openViewer();
     viewer_->setSections({{{0, 0, -1}, -0.25}});
-    viewer_->setSectionCaps(true);
+    viewer_->setSectionCaps(Caps::Closed);
     settle();
     const auto cap = viewer_->capAt(glm::dvec2(kSize) / 2.0);
     ASSERT_TRUE(cap);

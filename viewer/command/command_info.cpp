@@ -59,6 +59,9 @@ Json toJson(const std::string& file, const Dataset& dataset) {
             {"triangles", h.triangles},
             {"degenerate_triangles", h.degenerateTriangles},
             {"vertices", h.vertices},
+            {"parts", dataset.hasParts() ? Json(h.parts) : Json()},
+            {"closed_parts", dataset.hasParts() ? Json(h.closedParts) : Json()},
+            {"open_edges", dataset.hasParts() ? Json(h.openEdges) : Json()},
             {"colour", dataset.hasColour()},
             {"bounds_min", Json::array({h.boundsMin[0], h.boundsMin[1], h.boundsMin[2]})},
             {"bounds_max", Json::array({h.boundsMax[0], h.boundsMax[1], h.boundsMax[2]})},
@@ -83,12 +86,19 @@ std::string paperLine(const PaperParameters& p) {
         p.safeEmpty != 0 ? "safe" : "published");
 }
 
+std::string partsLine(const FileHeader& h) {
+    const char* kind = h.closedParts == h.parts ? "closed" : h.closedParts == 0 ? "open" : "mixed";
+    return fmt::format("  parts       {}: {} closed, {} open with {} open edges\n", kind, formatCount(h.closedParts),
+                       formatCount(h.parts - h.closedParts), formatCount(h.openEdges));
+}
+
 std::string summary(const std::string& file, const Dataset& dataset) {
     const FileHeader& h = dataset.header;
     std::string text = fmt::format("{}: .vcp version {}, {}\n", file, h.version, formatBytes(h.fileBytes));
     text += fmt::format("  mesh        {} triangles ({} without area), {} vertices, {}\n", formatCount(h.triangles),
                         formatCount(h.degenerateTriangles), formatCount(h.vertices),
                         dataset.hasColour() ? "with colour" : "no colour");
+    if (dataset.hasParts()) text += partsLine(h);
     text += fmt::format("  bounds      {:.9g} {:.9g} {:.9g}  to  {:.9g} {:.9g} {:.9g}\n", h.boundsMin[0],
                         h.boundsMin[1], h.boundsMin[2], h.boundsMax[0], h.boundsMax[1], h.boundsMax[2]);
     text += fmt::format("  origin      {:.9g} {:.9g} {:.9g}\n", h.origin[0], h.origin[1], h.origin[2]);

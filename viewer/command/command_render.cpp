@@ -1,4 +1,6 @@
 // vcp render: pictures without a window: one, one larger than the device draws at once, or a sequence.
+#include <algorithm>
+
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <glm/geometric.hpp>
@@ -125,7 +127,7 @@ FrameRequest requestFor(const RenderCommand& command, const SceneFile& scene, co
     request.sectionCaps = command.render.caps;
     if (request.sections.empty()) {
         request.sections = scene.sections;
-        request.sectionCaps = command.render.caps || scene.sectionCaps;
+        request.sectionCaps = std::max(command.render.caps, scene.sectionCaps);
     }
     if (scene.light) {
         request.shading.lightFollowsCamera = scene.light->followsCamera;

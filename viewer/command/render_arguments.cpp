@@ -1,5 +1,7 @@
 #include "viewer/command/render_arguments.h"
 
+#include <map>
+
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -85,7 +87,10 @@ void addRenderSettings(CLI::App& app, RenderSettings& settings) {
                   "to 6 times")
         ->type_name("PLANE")
         ->expected(1, int(kMostSections));
-    app.add_flag("--caps", settings.caps, "Fill what sections cut open (for closed surfaces)");
+    app.add_flag("--caps{closed}", settings.caps,
+                 "Fill what sections cut open of closed parts, and draw the rest as lines; --caps=all: fill as if all "
+                 "were closed")
+        ->transform(CLI::Transformer(std::map<std::string, Caps>{{"closed", Caps::Closed}, {"all", Caps::All}}));
     beginGroup(app, help_group::kLimits);
     app.add_option("--error-pixels", settings.errorPixels,
                    "Error that may be seen, in pixels: detail is loaded until the picture errs by no more")

@@ -40,7 +40,7 @@ Result<void> RenderSettings::checkFor(const Dataset& dataset) const {
     const auto usage = [](const char* message) { return Error{.code = ErrorCode::Usage, .message = message}; };
     const bool isPaper = dataset.header.method == Method::Paper;
     if (!isPaper && march != PaperMarch{}) return usage("the paper's march is for files built by the paper's method");
-    if (isPaper && (shading.shadows || shading.occlusionRays > 0 || caps))
+    if (isPaper && (shading.shadows || shading.occlusionRays > 0 || caps != Caps::None))
         return usage("files built by the paper's method are drawn without shadows, ambient occlusion and caps");
     return {};
 }

@@ -39,7 +39,7 @@ struct RenderSettings {
     UpAxis up = UpAxis::Y;
     Shading shading;
     std::vector<PlaneChoice> sections;
-    bool caps = false;
+    Caps caps = Caps::None;
     PaperMarch march;
     std::optional<LengthUnit> unit;  ///< the world's, for lengths that are shown
     SourceAccess source;

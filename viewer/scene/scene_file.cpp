@@ -57,7 +57,7 @@ public:
         if (json.contains("lights")) scene.light = light(json["lights"]);
         if (json.contains("camera")) scene.camera = camera(json["camera"]);
         if (json.contains("sections")) scene.sections = sections(json["sections"]);
-        if (json.contains("caps")) scene.sectionCaps = flag(json["caps"], "/caps");
+        if (json.contains("caps")) scene.sectionCaps = caps(json["caps"]);
         if (json.contains("annotations")) scene.annotations = annotations(json["annotations"]);
         return scene;
     }
@@ -111,6 +111,12 @@ private:
     bool flag(const Json& value, const std::string& at) {
         if (!value.is_boolean()) return wrong(at, "must be true or false"), false;
         return value.get<bool>();
+    }
+
+    Caps caps(const Json& value) {
+        if (value == "all") return Caps::All;
+        if (!value.is_boolean()) return wrong("/caps", "must be true or false, or \"all\""), Caps::None;
+        return value.get<bool>() ? Caps::Closed : Caps::None;
     }
 
     glm::dvec3 triple(const Json& value, const std::string& at) {

@@ -36,7 +36,7 @@ struct SceneFile {
     std::optional<SceneLight> light;
     std::optional<OrbitCamera> camera;
     std::vector<SectionPlane> sections;  ///< at most kMostSections
-    bool sectionCaps = false;
+    Caps sectionCaps = Caps::None;
     std::vector<Annotation> annotations;  ///< at most kMostAnnotations
 };
 

@@ -102,7 +102,7 @@ std::string sceneToJson(const SceneFile& scene) {
     text.addList("sections", scene.sections, [](const SectionPlane& plane) {
         return Json{{"normal", triple(plane.normal)}, {"offset", plane.offset}};
     });
-    if (scene.sectionCaps) text.add("caps", true);
+    if (scene.sectionCaps != Caps::None) text.add("caps", scene.sectionCaps == Caps::All ? Json("all") : Json(true));
     text.addList("annotations", scene.annotations, annotationJson);
     return text.take();
 }

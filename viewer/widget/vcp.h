@@ -332,7 +332,9 @@ typedef struct vcp_look {
     /* Rays a pixel of a picture at rest, 1 to 64, whose light is averaged: smooth edges. 0, and from the beginning: 16,
      * and 64 where the view has a window. Pictures in motion, false colours and normals have one. */
     uint32_t samples;
-    uint32_t section_caps; /* 1: what the planes cut open is filled; right for closed surfaces */
+    /* 1: what the planes cut open of closed parts is filled, and open surfaces show as lines; 2: all is filled as if it
+     * were closed, as it is where a file does not say which parts are */
+    uint32_t section_caps;
 } vcp_look;
 
 VCP_API vcp_status vcp_view_get_look(vcp_view* view, vcp_look* look);

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <numbers>
@@ -240,7 +241,7 @@ vcp_look lookOf(const Viewer& viewer) {
     look.light_in_world = shading.lightFollowsCamera ? 0 : 1;
     look.transparent = shading.transparent ? 1 : 0;
     look.samples = viewer.samples();
-    look.section_caps = viewer.sectionCaps() ? 1 : 0;
+    look.section_caps = uint32_t(viewer.sectionCaps());
     for (int i = 0; i < 3; ++i) {
         look.light[i] = shading.lightDirection[i];
         look.background_top[i] = shading.backgroundTop[i];
@@ -310,7 +311,7 @@ Result<void> setLook(vcp_view& view, const vcp_look* given) {
     viewer.setErrorPixels(look.error_pixels);
     viewer.setSamples(look.samples);
     viewer.setSections(std::move(sections));
-    viewer.setSectionCaps(look.section_caps != 0);
+    viewer.setSectionCaps(vcp::Caps(std::min(look.section_caps, 2u)));
     return {};
 }
 

@@ -188,6 +188,11 @@ void Interface::layOutCut() {
     bool isCut = !viewer.sections().empty();
     if (switchRow(*look_, "Cut open", isCut, {"Cut with a plane through the middle", "X"}))
         session_->act(ViewerAction::ToggleSection);
+    if (!isCut) return;
+    static constexpr const char* kCaps[] = {"Hollow", "Closed", "All"};
+    int caps = int(viewer.sectionCaps());
+    if (choiceRow(*look_, "caps", kCaps, caps, {"Fill nothing, closed parts, or all as if it were closed", ""}))
+        viewer.setSectionCaps(Caps(caps));
     if (viewer.sections().size() != 1) return;
     const SectionPlane plane = viewer.sections().front();
     static constexpr const char* kAxes[] = {"X", "Y", "Z"};

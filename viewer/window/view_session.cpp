@@ -144,7 +144,7 @@ Result<void> ViewSession::show(const OpenedScene& open, const std::vector<std::s
     }
     const bool hasOwnSections = viewer_->sections().empty() && !open.file.sections.empty();
     if (hasOwnSections) viewer_->setSections(open.file.sections);
-    viewer_->setSectionCaps(options_.render.caps || (hasOwnSections && open.file.sectionCaps));
+    viewer_->setSectionCaps(std::max(options_.render.caps, hasOwnSections ? open.file.sectionCaps : Caps::None));
     if (open.file.light || std::exchange(hasSceneLight_, false)) {
         // The light of one scene does not apply to the next.
         Shading shading = viewer_->shading();

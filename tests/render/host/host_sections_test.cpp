@@ -44,7 +44,7 @@ FrameRequest cutRequest(const NamedCamera& named, const std::vector<SectionPlane
     request.shading.mode = mode;
     request.errorPixels = errorPixels;
     request.sections = sections;
-    request.sectionCaps = caps;
+    request.sectionCaps = caps ? Caps::Closed : Caps::None;
     return request;
 }
 
@@ -113,7 +113,7 @@ TEST_F(HostSections, ShadowsAndOcclusion) {
         request.shading.occlusionRays = i % 2 == 0 ? 0 : 4;
         const Planes whole = drawnBy(*host_, request);
         request.sections = sections[i % sections.size()];
-        request.sectionCaps = i % 3 != 0;
+        request.sectionCaps = i % 3 != 0 ? Caps::Closed : Caps::None;
         all += difference(request, built.cache().dataset().header.cell);
         const Planes cut = drawnBy(*host_, request);
         for (size_t k = 0; k < whole.depth.size(); ++k)
@@ -137,7 +137,7 @@ TEST_F(HostSections, SeveralSamplesOfDatasetsTurnedAndScaled) {
         FrameRequest request = requestOf(cameras[i].camera);
         request.shading.shadows = true;
         request.sections = sections[i % sections.size()];
-        request.sectionCaps = true;
+        request.sectionCaps = Caps::Closed;
         all += difference(request, built.cache().dataset().header.cell, 3);
         EXPECT_EQ(drawnBy(*casting_, request, 3).picture, drawnBy(*host_, request, 3).picture);
         EXPECT_TRUE(casting_->render(request)->onHost);
@@ -151,13 +151,84 @@ TEST_F(HostSections, PicksSayWhetherTheyAreOnACap) {
     openAll({placed(built.file())});
     FrameRequest request = requestOf(test::cameras(kLow, kHigh)[0].camera);
     request.sections = {through(kLow, kHigh, {0.5, 0.5, 0.5}, {0.2, 0.3, -1})};
-    request.sectionCaps = true;
+    request.sectionCaps = Caps::Closed;
     ASSERT_TRUE(renderer_->drawSettled(request));
     ASSERT_TRUE(casting_->drawSettled(request));
     const test::PickDifference picks = test::comparePicks(*casting_, *renderer_, request);
     EXPECT_LE(picks.differing, 1u);
     EXPECT_GT(picks.caps, 30u);
     EXPECT_GT(picks.ofDataset[0], picks.caps + 30u);
+}
+
+/// A ball and a bent sheet that is open, farther apart than a page is wide.
+test::BuiltMesh ballAndSheet() {
+    IndexedMesh mesh = test::sphereMesh({-1.7, 0.02, 0.03}, 0.5, 40);
+    IndexedMesh sheet = test::gridSurface(80, 20, false, [](double u, double v) {
+        const double angle = test::kTwoPi * u;
+        return glm::dvec3(0.8 + 0.6 * std::cos(angle), 0.6 * std::sin(angle), v - 0.5);
+    });
+    // Without a third of its circle it has no inside.
+    std::erase_if(sheet.triangles, [&](const auto& t) { return t[0] % 80 < 27 || t[1] % 80 < 27 || t[2] % 80 < 27; });
+    test::append(mesh, sheet);
+    return {mesh, 0.03};
+}
+
+TEST_F(HostSections, OpenSurfacesByHostAndShaders) {
+    const test::BuiltMesh built = ballAndSheet();
+    ASSERT_TRUE(built.ok());
+    ASSERT_TRUE(built.cache().dataset().hasOpenParts());
+    open(built);
+    const glm::dvec3 low(-2.2, -0.6, -0.5), high(1.4, 0.6, 0.53);
+    const auto cameras = test::cameras(low, high);
+    const auto sections = cuts(low, high);
+    for (const Caps caps : {Caps::Closed, Caps::All}) {
+        Difference all;
+        for (size_t i = 0; i < 2 * cameras.size(); ++i) {
+            FrameRequest request = requestOf(cameras[i % cameras.size()].camera);
+            request.errorPixels = i % 2 == 0 ? 0.2 : 4;
+            request.sections = sections[i % sections.size()];
+            request.sectionCaps = caps;
+            all += difference(request, built.cache().dataset().header.cell);
+        }
+        expectFew(all);
+    }
+}
+
+// Across the axis of the sheet: the ball is filled, the sheet is a line two pixels wide, and between its ends is
+// nothing.
+TEST_F(HostSections, AnOpenSurfaceIsALine) {
+    const test::BuiltMesh built = ballAndSheet();
+    ASSERT_TRUE(built.ok());
+    openAll({placed(built.file())});
+    FrameRequest request = requestOf(fitCamera({-2.2, -0.6, -0.5}, {1.4, 0.6, 0.53}, {0, 0, -1}, {0, 1, 0}, 0.6, 1.5));
+    request.errorPixels = 0.05;  // of the finest level: coarser pages hold both
+    request.sections = {{{0, 0, -1}, -0.043}};
+    request.sectionCaps = Caps::Closed;
+    ASSERT_TRUE(casting_->drawSettled(request));
+    uint64_t inBall = 0, onLine = 0;
+    for (uint32_t y = 0; y < request.height; ++y)
+        for (uint32_t x = 0; x < request.width; ++x) {
+            const CameraRay ray = cameraRay(request.camera, request.width, request.height, x + 0.5, y + 0.5);
+            const double t = (0.043 - ray.origin.z) / ray.direction.z;
+            const glm::dvec2 at(ray.origin + t * ray.direction);
+            const double pixel = t * 2 * std::tan(0.3) / request.height;
+            const double fromRim = std::abs(glm::distance(at, {-1.7, 0.02}) - 0.5);
+            if (fromRim < 2 * pixel) continue;
+            const auto hit = casting_->pick(x, y).value();
+            const bool onCap = hit && hit->onCap, isInBall = glm::distance(at, {-1.7, 0.02}) < 0.5;
+            const glm::dvec2 fromAxis = at - glm::dvec2(0.8, 0);
+            const double angle = std::atan2(fromAxis.y, fromAxis.x) / test::kTwoPi,
+                         turn = angle < 0 ? angle + 1 : angle;
+            const double fromSheet = std::abs(glm::length(fromAxis) - 0.6);
+            const bool isAlongSheet = turn > 28.0 / 80 && turn < 78.0 / 80;
+            EXPECT_TRUE(!isInBall || onCap) << x << " " << y;
+            EXPECT_TRUE(!isAlongSheet || fromSheet > 0.5 * pixel || onCap) << x << " " << y;
+            EXPECT_TRUE(isInBall || fromSheet < 2 * pixel || !onCap) << x << " " << y;
+            inBall += isInBall ? 1 : 0;
+            onLine += !isInBall && onCap ? 1 : 0;
+        }
+    EXPECT_GT(inBall, 1000u);
+    EXPECT_GT(onLine, 100u);
 }
 
 // A ball cut open: each pixel of the disc is cap, and none about it; without caps, its far wall is seen.
@@ -171,7 +242,7 @@ TEST_F(HostSections, ABallHasADisc) {
     const double disc = radius * std::sqrt(1 - 0.01);
     request.sections = {{{0, 0, -2}, -2 * plane}};
     for (const bool caps : {false, true}) {
-        request.sectionCaps = caps;
+        request.sectionCaps = caps ? Caps::Closed : Caps::None;
         const Planes drawn = drawnBy(*host_, request);
         uint64_t inDisc = 0;
         for (uint32_t y = 0; y < request.height; ++y)

@@ -30,7 +30,7 @@ TEST(SceneFile, TheDocumentsExampleIsRead) {
     ASSERT_TRUE(scene->camera);
     EXPECT_EQ(scene->camera->position, glm::dvec3(0, 0.2, 1.5));
     EXPECT_EQ(scene->sections, (std::vector<SectionPlane>{{{1, 0, 0}, 0.05}}));
-    EXPECT_TRUE(scene->sectionCaps);
+    EXPECT_EQ(scene->sectionCaps, Caps::Closed);
 }
 
 TEST(SceneFile, WhatIsWrongIsSaidWithItsLine) {
@@ -135,7 +135,7 @@ TEST(SceneFile, WhatIsWrittenIsReadAgain) {
     scene.camera = OrbitCamera();
     scene.camera->position = {1, 2, 30};
     scene.sections = {{{0, 0, -2}, -0.25}, {{1, 0.5, 0}, 7}};
-    scene.sectionCaps = true;
+    scene.sectionCaps = Caps::All;
     scene.annotations = {{{0.1, -2e5, 3}, "Nose, \"chipped\"", "Repaired in 1904: \u00fcbermalt"}, {{1, 1, 1}, ""}};
 
     const std::string text = sceneToJson(scene);
@@ -169,7 +169,7 @@ TEST(SceneFile, WhatIsWrittenIsReadAgain) {
     EXPECT_LT(glm::distance(read->light->direction, scene.light->direction), 1e-6f);
     expectNear(read->camera->position, scene.camera->position);
     EXPECT_EQ(read->sections, scene.sections);
-    EXPECT_TRUE(read->sectionCaps);
+    EXPECT_EQ(read->sectionCaps, Caps::All);
     EXPECT_EQ(read->annotations, scene.annotations);
     EXPECT_EQ(sceneToJson(*sceneFromJson(sceneToJson(*read), "scene.json", "")), sceneToJson(*read));
 }
