@@ -112,7 +112,7 @@ TriangleCutter::OctreeBox TriangleCutter::boxAround(const Polygon& piece, const 
 
 bool TriangleCutter::isWanted(const CutterBox& box) const {
     const int bits = std::max(box.log2Edge, within_.log2Edge);
-    return box.lower >> bits == within_.lower >> bits;
+    return (box.lower >> bits) == (within_.lower >> bits);
 }
 
 void TriangleCutter::split(const Polygon& piece, const CutterBox& whole) {
