@@ -69,7 +69,8 @@ TEST(IncludeRules, OnlyTheCommandLineNamesItsOptions) {
     const std::regex option("\"[^\"]*--[a-z][^\"]*\"");
     size_t checked = 0;
     for (const Room& room : rooms()) {
-        if (room.path.starts_with("viewer/command") || room.path == "viewer/examples" || room.path == "datasets_scripts")
+        if (room.path.starts_with("viewer/command") || room.path == "viewer/examples" ||
+            room.path == "datasets_scripts")
             continue;
         if (room.path.starts_with("viewer/bench")) continue;
         for (const auto& entry : fs::directory_iterator(kRoot / room.path)) {

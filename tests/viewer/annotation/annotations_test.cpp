@@ -78,7 +78,8 @@ TEST(Annotations, TheScaleBarIsAsLongAsItSays) {
 TEST(Annotations, PointsAreMarkedAndTitled) {
     const AnnotatedView view = flat(0.01);
     Annotations annotations;
-    annotations.points = {{{1, 2, 0}, "Nose"}, {{6.3, 0, 0}, "At the right edge"}, {{100, 0, 0}, "Outside"}, {{-2, 0, 0}, ""}};
+    annotations.points = {
+        {{1, 2, 0}, "Nose"}, {{6.3, 0, 0}, "At the right edge"}, {{100, 0, 0}, "Outside"}, {{-2, 0, 0}, ""}};
     const RecordingCanvas canvas = drawn(annotations, view);
     const glm::dvec2 nose(640 + 100, 400 - 200), edge(640 + 630, 400);
     ASSERT_EQ(canvas.discs.size(), 6u) << "two for each point that is seen";
