@@ -11,6 +11,7 @@
 
 #include <fmt/format.h>
 #include <oneapi/tbb/global_control.h>
+#include <oneapi/tbb/parallel_invoke.h>
 #include <oneapi/tbb/task_arena.h>
 
 #include "builder/checkpoint.h"
@@ -497,8 +498,11 @@ private:
         const std::vector<Corners> changed = keepThin(soup, bin);
         LatticeMesh mesh = meshOf(soup, hasColour());
         std::vector<LatticeTriangle>().swap(soup);
-        computeNormals(mesh);
-        VCP_TRY(files_.parts->add(mesh, changed, [&](glm::i32vec3 p) { return isIn(bin, p); }));
+        Result<void> noted;
+        tbb::parallel_invoke(
+            [&] { computeNormals(mesh); },
+            [&] { noted = files_.parts->add(mesh, changed, [&](glm::i32vec3 p) { return isIn(bin, p); }); });
+        VCP_TRY(noted);
         return mesh;
     }
 

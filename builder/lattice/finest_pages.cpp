@@ -31,28 +31,43 @@ FinestPages::FinestPages(PageGrid base, std::vector<std::vector<uint64_t>> parte
         first_ = glm::min(first_, at);
         last_ = glm::max(last_, at);
     }
+    Parts whole;
+    whole.fill(kWhole);
+    for (size_t i = 0; i < parted_.size(); ++i) {
+        const size_t first = parts_.size();
+        parts_.resize(first + parted_[i].size(), whole);
+        if (i == 0) continue;
+        const std::vector<uint64_t>& above = parted_[i - 1];
+        size_t page = 0;
+        for (size_t k = 0; k < parted_[i].size(); ++k) {
+            const uint64_t code = parted_[i][k];
+            while (above[page] != code >> 3) ++page;
+            parts_[first - above.size() + page][code & 7] = uint32_t(first + k);
+        }
+    }
 }
 
-bool FinestPages::isParted(uint32_t level, uint64_t code) const {
-    const size_t i = level - base();
-    return i < parted_.size() && std::binary_search(parted_[i].begin(), parted_[i].end(), code);
+uint32_t FinestPages::numberOf(uint64_t code) const {
+    const auto at = std::lower_bound(parted_[0].begin(), parted_[0].end(), code);
+    return at != parted_[0].end() && *at == code ? uint32_t(at - parted_[0].begin()) : kWhole;
 }
 
-void FinestPages::addLevels(uint32_t level, uint64_t code, const glm::i64vec3& low, const glm::i64vec3& high,
-                            Levels& levels) const {
-    if (!isParted(level, code)) {
+void FinestPages::addLevels(uint32_t level, uint32_t number, const glm::i64vec3& corner, const glm::i64vec3& low,
+                            const glm::i64vec3& high, Levels& levels) const {
+    if (number == kWhole) {
         levels.coarsest = std::min(levels.coarsest, level);
         levels.deepest = std::max(levels.deepest, level);
         return;
     }
     const int64_t half = int64_t{1} << log2PageSteps(level + 1);
-    const glm::i64vec3 middle = glm::i64vec3(mortonDecode(code)) * (2 * half) + half;
+    const glm::i64vec3 middle = corner + half;
     const int first[3] = {low.x > middle.x, low.y > middle.y, low.z > middle.z};
     const int last[3] = {high.x >= middle.x, high.y >= middle.y, high.z >= middle.z};
     for (int z = first[2]; z <= last[2]; ++z)
         for (int y = first[1]; y <= last[1]; ++y)
             for (int x = first[0]; x <= last[0]; ++x)
-                addLevels(level + 1, code << 3 | uint64_t(x + 2 * y + 4 * z), low, high, levels);
+                addLevels(level + 1, parts_[number][size_t(x + 2 * y + 4 * z)],
+                          corner + half * glm::i64vec3(x, y, z), low, high, levels);
 }
 
 FinestPages::Levels FinestPages::levelsAround(glm::i32vec3 p, int64_t reach) const {
@@ -68,8 +83,10 @@ FinestPages::Levels FinestPages::levelsAround(glm::i32vec3 p, int64_t reach) con
     last = glm::min(last, last_);
     for (int64_t z = first.z; z <= last.z; ++z)
         for (int64_t y = first.y; y <= last.y; ++y)
-            for (int64_t x = first.x; x <= last.x; ++x)
-                addLevels(base(), mortonEncode(glm::u32vec3(x, y, z)), low, high, levels);
+            for (int64_t x = first.x; x <= last.x; ++x) {
+                const glm::i64vec3 at(x, y, z);
+                addLevels(base(), numberOf(mortonEncode(glm::u32vec3(at))), at << int64_t(bits), low, high, levels);
+            }
     return levels;
 }
 

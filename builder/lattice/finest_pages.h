@@ -10,6 +10,7 @@
 // A triangle then has its corners on the lattice of every page that it touches.
 #pragma once
 
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <vector>
@@ -37,7 +38,6 @@ public:
     [[nodiscard]] PageGrid gridOf(uint32_t level) const { return {grid_.log2Cells, level}; }
     /// What makes the same pages again; ascending codes.
     [[nodiscard]] const std::vector<std::vector<uint64_t>>& parted() const { return parted_; }
-    [[nodiscard]] bool isParted(uint32_t level, uint64_t code) const;
     /// Returns the first code of the deepest level within a page.
     [[nodiscard]] uint64_t firstCode(uint32_t level, uint64_t code) const { return code << 3 * (deepest() - level); }
 
@@ -60,16 +60,24 @@ private:
     struct Levels {
         uint32_t coarsest, deepest;
     };
+    /// Of a parted page, the numbers of those of its eight parts that are parted themselves; kWhole for the others.
+    using Parts = std::array<uint32_t, 8>;
+    static constexpr uint32_t kWhole = 0xffffffff;
+
+    /// Returns the number of a page of the base level, or kWhole.
+    [[nodiscard]] uint32_t numberOf(uint64_t code) const;
     /// Returns the levels of the pages that touch the box of half edge `reach` around a point.
     [[nodiscard]] Levels levelsAround(glm::i32vec3 p, int64_t reach) const;
-    void addLevels(uint32_t level, uint64_t code, const glm::i64vec3& low, const glm::i64vec3& high,
-                   Levels& levels) const;
+    /// Adds the levels of the pages in page `number`, at `corner`, that touch a box.
+    void addLevels(uint32_t level, uint32_t number, const glm::i64vec3& corner, const glm::i64vec3& low,
+                   const glm::i64vec3& high, Levels& levels) const;
     [[nodiscard]] int log2PageSteps(uint32_t level) const {
         return int(grid_.log2Cells + PageGrid::kLog2LatticePerCell + deepest() - level);
     }
 
     PageGrid grid_;
     std::vector<std::vector<uint64_t>> parted_;  ///< [0]: of the base level; the last is not empty
+    std::vector<Parts> parts_;                   ///< of all parted pages, level after level
     glm::i64vec3 first_{0}, last_{-1};           ///< box of pages of the base level that holds those that are parted
 };
 
@@ -82,7 +90,8 @@ void FinestPages::forPagesNear(const glm::i32vec3 (&corner)[3], double margin, u
     const BoxOverlap overlap(
         {glm::dvec3(corner[0]) * perStep, glm::dvec3(corner[1]) * perStep, glm::dvec3(corner[2]) * perStep});
     // The triangle's bounds choose the pages; where they leave more than one, it may still miss some.
-    const auto visitRange = [&](const auto& self, uint32_t level, glm::u32vec3 first, glm::u32vec3 last) -> void {
+    const auto visitRange = [&](const auto& self, uint32_t level, uint32_t above, glm::u32vec3 first,
+                                glm::u32vec3 last) -> void {
         const double edge = std::ldexp(1.0, -int(level - base()));
         for (uint32_t z = first.z; z <= last.z; ++z)
             for (uint32_t y = first.y; y <= last.y; ++y)
@@ -93,18 +102,20 @@ void FinestPages::forPagesNear(const glm::i32vec3 (&corner)[3], double margin, u
                                           glm::all(glm::lessThanEqual(overlap.upper(), high));
                     if (!isWithin && !overlap.test((low + high) / 2.0, (0.5 + reach) * edge)) continue;
                     const uint64_t code = mortonEncode(at);
-                    if (!isParted(level, code)) {
+                    const uint32_t number = level == base() ? numberOf(code) : parts_[above][code & 7];
+                    if (number == kWhole) {
                         visit(level, code);
                         continue;
                     }
                     const glm::dvec3 middle = (low + high) / 2.0;
                     const double wide = reach * edge / 2 + 1e-9;
-                    self(self, level + 1, at * 2u + glm::u32vec3(glm::greaterThan(overlap.lower() - wide, middle)),
+                    self(self, level + 1, number,
+                         at * 2u + glm::u32vec3(glm::greaterThan(overlap.lower() - wide, middle)),
                          at * 2u + glm::u32vec3(glm::greaterThanEqual(overlap.upper() + wide, middle)));
                 }
     };
     const glm::dvec3 from = overlap.lower() - reach - 1e-9, to = overlap.upper() + reach + 1e-9;
-    visitRange(visitRange, base(), glm::u32vec3(glm::max(glm::i32vec3(glm::floor(from)), 0)),
+    visitRange(visitRange, base(), kWhole, glm::u32vec3(glm::max(glm::i32vec3(glm::floor(from)), 0)),
                glm::u32vec3(glm::min(glm::i32vec3(glm::floor(to)), grid_.lastPage())));
 }
 

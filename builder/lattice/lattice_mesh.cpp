@@ -6,6 +6,7 @@
 
 #include <oneapi/tbb/blocked_range.h>
 #include <oneapi/tbb/parallel_for.h>
+#include <oneapi/tbb/parallel_invoke.h>
 #include <oneapi/tbb/parallel_sort.h>
 #include <glm/geometric.hpp>
 
@@ -191,6 +192,16 @@ void sortTriangles(std::span<const LatticeTriangle> soup, const std::vector<uint
     }
 }
 
+/// Returns the normals that triangles give their vertices. They agree, except where a kept thin part ends at another
+/// triangle's vertex: then any of them will do that does not depend on the order.
+std::vector<uint32_t> leastNormals(std::span<const LatticeTriangle> soup, const std::vector<uint32_t>& corners,
+                                   size_t vertices) {
+    std::vector<uint32_t> normals(vertices, 0xffffffffu);
+    for (size_t k = 0; k < corners.size(); ++k)
+        normals[corners[k]] = std::min(normals[corners[k]], soup[k / 3].normal[k % 3]);
+    return normals;
+}
+
 /// Returns the means of the colours that triangles give their vertices.
 std::vector<uint32_t> meanColours(std::span<const LatticeTriangle> soup, const std::vector<uint32_t>& corners,
                                   size_t vertices) {
@@ -236,14 +247,13 @@ LatticeMesh meshOf(std::span<const LatticeTriangle> soup, bool withColour) {
             for (size_t k = range.begin(); k < range.end(); ++k) corners[k] = renamed[corners[k]];
         });
     }
-    // The normals agree, except where a kept thin part ends at another triangle's vertex: then any of them will do that
-    // does not depend on the order.
-    mesh.normals.assign(mesh.positions.size(), 0xffffffffu);
-    for (size_t k = 0; k < corners.size(); ++k)
-        mesh.normals[corners[k]] = std::min(mesh.normals[corners[k]], soup[k / 3].normal[k % 3]);
-    if (withColour) mesh.colours = meanColours(soup, corners, mesh.positions.size());
-    mesh.parts = partsOf(soup, corners, mesh.positions.size());
-    sortTriangles(soup, corners, mesh);
+    const size_t vertices = mesh.positions.size();
+    tbb::parallel_invoke([&] { sortTriangles(soup, corners, mesh); },
+                         [&] {
+                             mesh.normals = leastNormals(soup, corners, vertices);
+                             if (withColour) mesh.colours = meanColours(soup, corners, vertices);
+                             mesh.parts = partsOf(soup, corners, vertices);
+                         });
     return mesh;
 }
 

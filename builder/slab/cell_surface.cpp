@@ -64,7 +64,8 @@ void chooseAxis(CellSurface& cell) {
     for (int i = 0; i < kSquarings; ++i) {
         const double trace = xx + yy + zz;
         if (!(trace > 0)) return;
-        for (double* entry : {&xx, &yy, &zz, &yz, &zx, &xy}) *entry /= trace;
+        const double scale = 1 / trace;
+        for (double* entry : {&xx, &yy, &zz, &yz, &zx, &xy}) *entry *= scale;
         const double xx2 = xx * xx + xy * xy + zx * zx, yy2 = xy * xy + yy * yy + yz * yz,
                      zz2 = zx * zx + yz * yz + zz * zz;
         const double yz2 = xy * zx + yy * yz + yz * zz, zx2 = zx * xx + yz * xy + zz * zx,

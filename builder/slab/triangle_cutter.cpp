@@ -44,8 +44,8 @@ void sortHighHalves(std::vector<uint64_t>& words, int bits) {
 }  // namespace
 
 glm::dvec3 TriangleCutter::Source::weightsAt(glm::dvec3 p) const {
-    const glm::dvec3 ab = corners[1] - corners[0], ac = corners[2] - corners[0], ap = p - corners[0];
-    const double b = glm::dot(glm::cross(ap, ac), cross) * perArea, c = glm::dot(glm::cross(ab, ap), cross) * perArea;
+    const glm::dvec3 ap = p - corners[0];
+    const double b = glm::dot(ap, secondGrows), c = glm::dot(ap, thirdGrows);
     return {1 - b - c, b, c};
 }
 
@@ -55,9 +55,11 @@ TriangleCutter::Source TriangleCutter::sourceOf(uint32_t triangle) const {
     for (size_t i = 0; i < 3; ++i)
         source.corners[i] = glm::dvec3(mesh_.positions[t[i]] - origin_) * (2.0 / double(kLatticePerCell));
     const auto& [a, b, c] = source.corners;
-    source.cross = glm::cross(b - a, c - a);
-    source.perArea = 1 / glm::dot(source.cross, source.cross);
-    const glm::dvec3 flat = glm::normalize(source.cross);
+    const glm::dvec3 cross = glm::cross(b - a, c - a);
+    const double squared = glm::dot(cross, cross);
+    source.secondGrows = glm::cross(c - a, cross) / squared;
+    source.thirdGrows = glm::cross(cross, b - a) / squared;
+    const glm::dvec3 flat = cross / std::sqrt(squared);
     for (size_t i = 0; i < 3; ++i) {
         source.normal[i] = f64::cornerNormal(mesh_.normals[t[i]], flat);
         const uint32_t rgba = mesh_.colours.empty() ? 0xffffffffu : mesh_.colours[t[i]];
@@ -95,11 +97,12 @@ TriangleCutter::OctreeBox TriangleCutter::boxAround(const Polygon& piece, const 
     int differ = 0;
     for (int axis = 0; axis < 3; ++axis) {
         // A piece that only reaches a wall is in the cell that it comes from; one in a wall is on both sides of it.
-        const double floor = std::floor(least[axis]);
-        const bool isInWall = least[axis] == most[axis] && least[axis] == floor;
+        // No coordinate is negative, so conversion rounds down.
+        const int begin = int(least[axis]), end = int(most[axis]);
+        const bool endsInWall = double(end) == most[axis], isInWall = endsInWall && least[axis] == most[axis];
         const int lower = whole.lower[axis], upper = lower + (1 << whole.log2Edge) - 1;
-        first[axis] = std::clamp(int(floor) - (isInWall ? 1 : 0), lower, upper);
-        last[axis] = std::clamp(isInWall ? int(floor) : int(std::ceil(most[axis])) - 1, lower, upper);
+        first[axis] = std::clamp(begin - (isInWall ? 1 : 0), lower, upper);
+        last[axis] = std::clamp(end - (endsInWall && !isInWall ? 1 : 0), lower, upper);
         differ |= first[axis] ^ last[axis];
     }
     const int bits = int(std::bit_width(unsigned(differ)));
@@ -148,8 +151,8 @@ void TriangleCutter::keep(const Polygon& piece, glm::ivec3 cell) {
     const double size = glm::length(areaVector(piece));
     if (size == 0) return;
     glm::dvec3 middle(0);
-    for (const glm::dvec3& p : piece) middle += p / double(piece.size());
-    const glm::dvec3 w = source_.weightsAt(middle);
+    for (const glm::dvec3& p : piece) middle += p;
+    const glm::dvec3 w = source_.weightsAt(middle / double(piece.size()));
     const auto& n = source_.normal;
     const auto& colour = source_.colour;
     const glm::dvec3 normal = w.x * n[0] + w.y * n[1] + w.z * n[2];

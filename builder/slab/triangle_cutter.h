@@ -40,8 +40,7 @@ private:
     /// it.
     struct Source {
         Triangle3 corners;
-        glm::dvec3 cross{0};  ///< along the normal, twice the area long
-        double perArea = 0;   ///< one by the square of that
+        glm::dvec3 secondGrows{0}, thirdGrows{0};  ///< gradients of these corners' weights
         std::array<glm::dvec3, 3> normal;
         std::array<glm::dvec4, 3> colour;
         /// Returns the weights of the corners at a point of the triangle.
