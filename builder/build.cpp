@@ -2,6 +2,7 @@
 
 #include <sys/resource.h>
 #include <algorithm>
+#include <array>
 #include <memory>
 #include <optional>
 #include <utility>
@@ -103,6 +104,7 @@ private:
         else
             VCP_TRY(resumeMeasures());
         VCP_TRY(chooseGrid(done_.levelsLess));
+        if (auto warning = wideCellWarning(options_, measures_)) report_.warnings.push_back(std::move(*warning));
         plan_.isExact = options_.error <= 0;
         // Beside soft leaves slabs would have to be continued across walls: their surface does not cover the mesh's.
         plan_.hasSlabs = plan_.isExact && options_.coarseLeaves == CoarseLeaves::Slabs;
@@ -246,30 +248,22 @@ private:
         }));
         VCP_TRY(checkOutput(options_.output, OutputKind::Dataset, rules()));
         releaseMemory();
-        VCP_TRY(checkFreeSpace());
+        VCP_TRY(checkSpace());
         // Images are not kept, so a soup that needs them is dealt before its checkpoint.
         return files_.soup->materials.empty() ? checkpoint("read", 0) : Result<void>();
     }
 
     /// Checks the free space now: a disk that is too small would be noticed only after hours.
-    Result<void> checkFreeSpace() const {
-        const auto check = [&](const std::filesystem::path& at, uint64_t needed, const char* what) -> Result<void> {
-            const uint64_t free = freeBytesAt(at);
-            if (needed <= free) return {};
-            // The two numbers are rounded apart, so that they never read the same.
-            return Error{.code = ErrorCode::Limit,
-                         .message = fmt::format("about {} MB are needed in the folder {} and {} MB are free there; "
-                                                "free some space or choose another {}",
-                                                needed / 1000000 + 1,
-                                                at.has_filename() && !std::filesystem::is_directory(at)
-                                                    ? std::filesystem::absolute(at).parent_path().string()
-                                                    : at.string(),
-                                                free / 1000000, what),
-                         .file = options_.output.string()};
-        };
+    Result<void> checkSpace() const {
         const uint64_t temp = expectedTempBytes(measures_.triangles, memory_.tempBytes), there = space_.diskBytes();
-        VCP_TRY(check(space_.folder().path(), temp > there ? temp - there : 0, "temporary folder"));
-        return check(options_.output, expectedFileBytes(measures_.triangles), "folder");
+        const std::array<SpaceNeed, 2> needs{
+            {{space_.folder().path(), temp > there ? temp - there : 0, "temporary folder"},
+             {options_.output, expectedFileBytes(measures_.triangles), "folder"}}};
+        auto checked = checkFreeSpace(needs);
+        if (checked) return {};
+        Error error = checked.error();
+        error.file = options_.output.string();
+        return error;
     }
 
     [[nodiscard]] bool usesVertexColours() const {

@@ -1,9 +1,11 @@
 #include "builder/estimate.h"
 
+#include <sys/stat.h>
 #include <algorithm>
 #include <limits>
 #include <thread>
 
+#include <fmt/format.h>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
@@ -74,12 +76,51 @@ uint64_t expectedTempBytes(uint64_t triangles, uint64_t heldInMemory) {
 
 uint64_t expectedFileBytes(uint64_t triangles) { return uint64_t(kFileBytesPerTriangle * double(triangles)); }
 
-uint64_t freeBytesAt(const std::filesystem::path& path) {
+namespace {
+
+/// Returns the path, or the nearest folder above it that exists.
+std::filesystem::path existingAt(const std::filesystem::path& path) {
     std::error_code failed;
     std::filesystem::path at = std::filesystem::absolute(path, failed);
     while (!at.empty() && !std::filesystem::exists(at, failed) && at != at.parent_path()) at = at.parent_path();
-    const auto space = std::filesystem::space(at, failed);
+    return at;
+}
+
+bool areOnOneDisk(const std::filesystem::path& a, const std::filesystem::path& b) {
+    struct stat ofA {
+    }, ofB{};
+    return stat(existingAt(a).c_str(), &ofA) == 0 && stat(existingAt(b).c_str(), &ofB) == 0 && ofA.st_dev == ofB.st_dev;
+}
+
+std::string folderOf(const std::filesystem::path& path) {
+    const bool isFile = path.has_filename() && !std::filesystem::is_directory(path);
+    return isFile ? std::filesystem::absolute(path).parent_path().string() : path.string();
+}
+
+}  // namespace
+
+uint64_t freeBytesAt(const std::filesystem::path& path) {
+    std::error_code failed;
+    const auto space = std::filesystem::space(existingAt(path), failed);
     return failed ? std::numeric_limits<uint64_t>::max() : space.available;
+}
+
+Result<void> checkFreeSpace(std::span<const SpaceNeed> needs) {
+    for (const SpaceNeed& need : needs) {
+        uint64_t together = 0;
+        for (const SpaceNeed& each : needs)
+            if (areOnOneDisk(each.path, need.path)) together += each.bytes;
+        const uint64_t free = freeBytesAt(need.path);
+        if (together <= free) continue;
+        // The two numbers are rounded apart, so that they never read the same.
+        return Error{.code = ErrorCode::Limit,
+                     .message = fmt::format("about {} MB are needed in the folder {}{} and {} MB are free there; free "
+                                            "some space or choose another {}",
+                                            together / 1000000 + 1, folderOf(need.path),
+                                            together > need.bytes ? " and elsewhere on its disk" : "", free / 1000000,
+                                            need.folder)};
+    }
+    return {};
 }
 
 Result<BuildEstimate> estimateBuild(const BuildOptions& options) {

@@ -3,6 +3,8 @@
 #pragma once
 
 #include <functional>
+#include <span>
+#include <string>
 
 #include "builder/build.h"
 #include "builder/ingest.h"
@@ -27,6 +29,16 @@ uint64_t expectedFileBytes(uint64_t triangles);
 
 /// Returns the free bytes where `path`, or the folder it will be in, lies; the largest number when that is unknown.
 uint64_t freeBytesAt(const std::filesystem::path& path);
+
+/// Bytes that will be written where `path`, or the folder it will be in, lies.
+struct SpaceNeed {
+    std::filesystem::path path;
+    uint64_t bytes;
+    std::string folder;  ///< the folder by its purpose, for the error: "temporary folder"
+};
+
+/// Checks that there is room for all of this at once; needs on the same disk are added up. Errors: Limit.
+Result<void> checkFreeSpace(std::span<const SpaceNeed> needs);
 
 /// Reads the inputs and writes nothing. Errors: as buildOctree's while reading.
 Result<BuildEstimate> estimateBuild(const BuildOptions& options);

@@ -234,10 +234,27 @@ double resolvedCell(const SoupMeasures& m) {
     return std::max(glm::length(m.boundsMin), glm::length(m.boundsMax)) * std::numeric_limits<double>::epsilon() * 1e4;
 }
 
+/// Returns the smallest cell that a grid around the mesh can have.
+double leastCell(const SoupMeasures& m) { return std::max(longestOf(m) / kMaxExtentCells, resolvedCell(m)); }
+
+/// Returns the cell that suits the mesh's triangles.
+double suitableCell(const SoupMeasures& m) {
+    const auto useful = double(m.triangles - m.degenerateTriangles);
+    return std::max(std::sqrt(m.area / (useful * kTriangleAreaPerCellArea)), m.length / useful / kMostMeanEdgeCells);
+}
+
 }  // namespace
 
+std::optional<std::string> wideCellWarning(const BuildOptions& options, const SoupMeasures& m) {
+    if (options.cell > 0 || suitableCell(m) >= leastCell(m)) return std::nullopt;
+    return fmt::format(
+        "cells are {:.3g} long where the triangles ask for {:.3g}, since the mesh reaches {:.3g} far: leave out what "
+        "lies far away, or move the mesh to the origin, for sharper close-ups",
+        leastCell(m), suitableCell(m), std::max({longestOf(m), glm::length(m.boundsMin), glm::length(m.boundsMax)}));
+}
+
 uint32_t mostLevelsBelow(const GridFrame& frame, const SoupMeasures& m) {
-    const double least = std::max(longestOf(m) / kMaxExtentCells, resolvedCell(m));
+    const double least = leastCell(m);
     uint32_t count = 0;
     while (frame.levels + count < kMaxLevels && frame.withLevelsBelow(count + 1).cell >= least) ++count;
     return count;
@@ -247,13 +264,7 @@ Result<GridFrame> chooseFrame(const BuildOptions& options, const SoupMeasures& m
     GridFrame frame;
     frame.log2Cells = kLog2Cells;
     const double longest = longestOf(m);
-    const double useful = double(m.triangles - m.degenerateTriangles);
-    frame.cell = options.cell > 0 ? options.cell : std::sqrt(m.area / (useful * kTriangleAreaPerCellArea));
-    if (options.cell <= 0) {
-        frame.cell =
-            std::max({frame.cell, m.length / useful / kMostMeanEdgeCells, longest / kMaxExtentCells, resolvedCell(m)});
-        frame.cell = std::ldexp(frame.cell, int(levelsLess));
-    }
+    frame.cell = options.cell > 0 ? options.cell : std::ldexp(std::max(suitableCell(m), leastCell(m)), int(levelsLess));
     if (longest / frame.cell > kMaxExtentCells)
         return Error{
             .code = ErrorCode::Limit,

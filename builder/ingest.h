@@ -71,6 +71,10 @@ Result<SoupMeasures> readInputs(const BuildOptions& options, TempSpace& space, u
 /// Returns how the inputs are opened.
 MeshOpenOptions meshOptionsOf(const BuildOptions& options);
 
+/// Returns what to say where the mesh reaches so far that its cells are wider than suits its triangles; none where they
+/// are not, or where the cell was given.
+std::optional<std::string> wideCellWarning(const BuildOptions& options, const SoupMeasures& measures);
+
 /// Chooses the grid; `options.cell` 0 chooses a cell from the area, the lengths and the number of triangles, then twice
 /// as long as often as `levelsLess` says. Errors: InvalidInput, Limit.
 Result<GridFrame> chooseFrame(const BuildOptions& options, const SoupMeasures& measures, uint32_t levelsLess = 0);

@@ -66,8 +66,8 @@ void FinestPages::addLevels(uint32_t level, uint32_t number, const glm::i64vec3&
     for (int z = first[2]; z <= last[2]; ++z)
         for (int y = first[1]; y <= last[1]; ++y)
             for (int x = first[0]; x <= last[0]; ++x)
-                addLevels(level + 1, parts_[number][size_t(x + 2 * y + 4 * z)],
-                          corner + half * glm::i64vec3(x, y, z), low, high, levels);
+                addLevels(level + 1, parts_[number][size_t(x + 2 * y + 4 * z)], corner + half * glm::i64vec3(x, y, z),
+                          low, high, levels);
 }
 
 FinestPages::Levels FinestPages::levelsAround(glm::i32vec3 p, int64_t reach) const {

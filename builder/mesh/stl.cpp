@@ -18,6 +18,7 @@ constexpr size_t kStartBytes = 1024;
 constexpr size_t kHeaderBytes = 84;  // text, then the count
 constexpr size_t kFacetBytes = 50;   // normal, three vertices, attributes
 constexpr size_t kNormalBytes = 12;
+constexpr uint64_t kMostFacets = 0xffffffff;
 constexpr size_t kLineLimit = 64 * 1024;
 
 static_assert(std::endian::native == std::endian::little, "STL is little endian");
@@ -85,6 +86,11 @@ public:
             return source_.error(ErrorCode::InvalidInput, "header", kHeaderBytes - sizeof(uint32_t), "has no facets");
         const uint64_t whole = source_.remaining() / kFacetBytes;
         if (whole < facets_) return endsAfter(whole);
+        if (source_.sizeKnown() && whole > kMostFacets)
+            return source_.error(ErrorCode::Limit, "header", kHeaderBytes - sizeof(uint32_t),
+                                 fmt::format("the file has room for {} facets, more than the 32 bits of an STL's count "
+                                             "can say; convert the mesh to PLY, or part it",
+                                             whole));
         info_.format = "STL binary";
         info_.fileBytes = source_.fileBytes();
         info_.vertices = 3 * facets_;

@@ -1,6 +1,8 @@
 #include "builder/mesh/stl.h"
 
 #include <cstring>
+#include <filesystem>
+#include <fstream>
 #include <limits>
 
 #include "tests/support/mesh_reading.h"
@@ -110,6 +112,24 @@ TEST(Stl, CountsThatLieAreFoundBeforeAnythingIsRead) {
     }
     EXPECT_NE(read(binary(2, 0)).line().find("has no facets"), std::string::npos);
     EXPECT_NE(read("solid x\nendsolid x\n").line().find("has no facets"), std::string::npos);
+}
+
+TEST(Stl, AFileLongerThanItsCountCanSayIsRefused) {
+    const std::filesystem::path path = std::filesystem::path(testing::TempDir()) / "longer_than_its_count.stl";
+    const std::string bytes = binary(2, 2);
+    std::ofstream(path, std::ios::binary) << bytes;
+    const auto openAt = [&](uint64_t length) {
+        std::filesystem::resize_file(path, length);  // what is added takes no room on the disk
+        auto source = ByteSource::open(path);
+        return openStl(std::move(*source));
+    };
+    const uint64_t most = 84 + 50 * uint64_t{0xffffffff};
+    EXPECT_TRUE(openAt(most).ok());
+    const auto longer = openAt(most + 50);
+    std::filesystem::remove(path);
+    ASSERT_FALSE(longer.ok());
+    EXPECT_EQ(longer.error().code, ErrorCode::Limit);
+    EXPECT_NE(longer.error().line().find("room for 4294967296 facets"), std::string::npos) << longer.error().line();
 }
 
 TEST(Stl, APositionThatIsNotFiniteNamesFacetVertexAndByte) {
