@@ -10,7 +10,8 @@
 #include <set>
 
 #include <oneapi/tbb/enumerable_thread_specific.h>
-#include <oneapi/tbb/parallel_for.h>
+#include <oneapi/tbb/parallel_pipeline.h>
+#include <oneapi/tbb/task_arena.h>
 
 namespace vcp {
 
@@ -28,27 +29,47 @@ Result<void> forLatticeTriangles(const Soup& soup, const LatticeSnapper& snapper
     std::atomic<bool> failed = false, cancelled = false;
     std::mutex mutex;
     Result<void> result;
+    const auto end = [&](const Result<void>& here) {
+        const std::scoped_lock lock(mutex);
+        if (!here && !failed.exchange(true)) result = here;
+    };
+    const auto visitBlock = [&](const auto& bins, const RawBins::Block& block) -> Result<void> {
+        VCP_TRY_ASSIGN(const auto records, bins.read(block));
+        auto visit = makeVisit();
+        Result<void> here;
+        for (const auto& t : records)
+            snapper.add(
+                t,
+                [&](const LatticeTriangle& piece) {
+                    if (here) here = visit(piece);
+                },
+                painted);
+        if (here) here = visit.finish();
+        if (!progress(double(done += block.records) / double(total))) cancelled = true;
+        return here;
+    };
     const auto all = [&](const auto& bins) {
-        const auto blocks = bins.raw().blocks(0);
-        tbb::parallel_for(size_t{0}, blocks.size(), [&](size_t i) {
-            if (cancelled || failed) return;
-            auto visit = makeVisit();
-            auto records = bins.read(blocks[i]);
-            Result<void> here = records ? Result<void>() : Result<void>(records.error());
-            if (records)
-                for (const auto& t : *records)
-                    snapper.add(
-                        t,
-                        [&](const LatticeTriangle& piece) {
-                            if (here) here = visit(piece);
-                        },
-                        painted);
-            if (here) here = visit.finish();
-            if (!progress(double(done += blocks[i].records) / double(total))) cancelled = true;
-            if (here) return;
-            const std::scoped_lock lock(mutex);
-            if (!failed.exchange(true)) result = here;
-        });
+        uint64_t at = 0;
+        const auto next = [&](tbb::flow_control& control) -> RawBins::Block {
+            Result<RawBins::Block> block = RawBins::Block{};
+            if (!cancelled && !failed && at < bins.raw().bytes()) {
+                block = bins.raw().blockAt(at);
+                if (block) {
+                    at = block->end;
+                    return *block;
+                }
+                end(block.error());
+            }
+            control.stop();
+            return {};
+        };
+        const auto most = size_t(tbb::this_task_arena::max_concurrency()) * 2;
+        tbb::parallel_pipeline(most, tbb::make_filter<void, RawBins::Block>(tbb::filter_mode::serial_in_order, next) &
+                                         tbb::make_filter<RawBins::Block, void>(tbb::filter_mode::parallel,
+                                                                                [&](const RawBins::Block& block) {
+                                                                                    if (!cancelled && !failed)
+                                                                                        end(visitBlock(bins, block));
+                                                                                }));
     };
     all(soup.floats);
     all(soup.doubles);

@@ -103,8 +103,8 @@ Result<void> VertexJoin::resolve(Waiting& w) {
 }
 
 Result<void> VertexJoin::process(uint64_t chunk) {
-    const std::span<const RawBins::Block> blocks = waiting_.raw().blocks(chunk);
-    for (const RawBins::Block& block : std::vector(blocks.begin(), blocks.end())) {
+    VCP_TRY_ASSIGN(const auto blocks, waiting_.blocks(chunk));
+    for (const RawBins::Block& block : blocks) {
         VCP_TRY_ASSIGN(auto records, waiting_.read(block));
         for (Waiting& w : records) VCP_TRY(resolve(w));
     }

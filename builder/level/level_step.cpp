@@ -82,8 +82,8 @@ Result<void> LevelStep::pass(const WaitingTriangle& w, LevelSink::Batch& batch) 
 Result<void> LevelStep::stepWaiting(size_t bin, const LatticeMesh& mesh, const Images& images) {
     VCP_TRY(waiting_.raw().flush(bin));
     LevelSink::Batch batch(sink_);
-    const auto blocks = waiting_.raw().blocks(bin);
-    for (const RawBins::Block& block : std::vector(blocks.begin(), blocks.end())) {
+    VCP_TRY_ASSIGN(const auto blocks, waiting_.blocks(bin));
+    for (const RawBins::Block& block : blocks) {
         VCP_TRY_ASSIGN(auto records, waiting_.read(block));
         for (WaitingTriangle& w : records) {
             for (int i = 0; i < 3; ++i) {

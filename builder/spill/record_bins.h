@@ -1,12 +1,14 @@
 // Bins of fixed-size records on a temporary file: written in any order, read back bin by bin.
 //
-// Each bin fills a block; a full block is coded (words as differences to the record before, byte planes, zstd
-// at its fastest), or left as it is while there is ample memory, and appended with a header that names its bin, so that
-// the index can be made again from the file after an interruption. Headers and blocks carry hashes: a temporary disk
-// that returns wrong bytes is noticed.
+// Each bin fills a block. A full block, and the fullest ones where all together hold too much, is coded (words as
+// differences to the record before, byte planes, zstd at its fastest), or left as it is while there is ample memory,
+// and appended with a header that names its bin and the bin's block before it. So a bin costs a few bytes of memory
+// however many blocks it has, and everything is found again after an interruption. Headers and blocks carry hashes: a
+// temporary disk that returns wrong bytes is noticed.
 #pragma once
 
 #include <algorithm>
+#include <condition_variable>
 #include <cstdint>
 #include <cstring>
 #include <functional>
@@ -23,8 +25,8 @@ namespace vcp {
 /// appends.
 class RawBins {
 public:
-    /// `recordBytes`: a multiple of 4. `bins`: the expected number, more may come. `bufferBytes`: memory for all open
-    /// blocks together.
+    /// `recordBytes`: a multiple of 4. `bins`: the expected number, more may come. `bufferBytes`: memory for all bins
+    /// together; half of it can hold bufferBytes / 2 / kBinBytes bins.
     RawBins(TempSpace& space, std::string name, size_t recordBytes, size_t bins, uint64_t bufferBytes);
 
     Result<void> append(size_t bin, const std::byte* records, size_t count);
@@ -38,8 +40,8 @@ public:
     Result<void> reopen(uint64_t bytes);
     void remove();
 
-    [[nodiscard]] size_t bins() const { return blocks_.size(); }
-    [[nodiscard]] uint64_t count(size_t bin) const { return bin < counts_.size() ? counts_[bin] : 0; }
+    [[nodiscard]] size_t bins() const { return bins_.size(); }
+    [[nodiscard]] uint64_t count(size_t bin) const { return bin < bins_.size() ? bins_[bin].count : 0; }
     [[nodiscard]] uint64_t total() const;
     [[nodiscard]] uint64_t bytes() const { return file_.size(); }
     [[nodiscard]] const std::string& fileName() const { return file_.name(); }
@@ -48,30 +50,60 @@ public:
         uint64_t offset;  ///< offset of the header
         uint32_t records;
         uint32_t storedBytes;
+        uint64_t end;  ///< offset of the block behind it in the file
     };
-    [[nodiscard]] std::span<const Block> blocks(size_t bin) const {
-        return bin < blocks_.size() ? std::span<const Block>(blocks_[bin]) : std::span<const Block>();
-    }
-    [[nodiscard]] size_t blockRecords() const { return blockRecords_; }
+    /// Returns a bin's blocks, oldest first. Errors: Io; InvalidInput (damaged).
+    Result<std::vector<Block>> blocks(size_t bin) const;
+    /// Returns the block of any bin at an offset: from 0, each begins where the one before it ends, up to bytes().
+    /// Errors: Io; InvalidInput (damaged).
+    Result<Block> blockAt(uint64_t offset) const;
     /// Decodes a block to `out` (block.records records).
     Result<void> read(const Block& block, std::byte* out) const;
     /// Decodes all blocks of a bin, on the calling arena's threads. `out`: room for count(bin) records.
     Result<void> load(size_t bin, std::span<std::byte> out) const;
 
+    /// Memory of a bin without an open block.
+    static constexpr uint64_t kBinBytes = 40;
+
 private:
+    static constexpr uint64_t kNoBlock = ~uint64_t{0};
+
+    struct Bin {
+        std::vector<std::byte> open;
+        uint64_t last = kNoBlock;  ///< offset of its last block
+        uint64_t count = 0;
+    };
+    static_assert(sizeof(Bin) == kBinBytes);
+    struct BlockHeader;
+    /// What is on its way to the file: a bin's open block.
+    struct Leaving {
+        size_t bin;
+        std::vector<std::byte> records;
+    };
+
+    Bin& binAt(size_t bin);
+    /// Appends what fits the bin's open block; returns how many records that are.
+    size_t fill(Bin& bin, const std::byte* records, size_t count);
+    /// Writes the fullest open blocks where all together hold too much.
+    Result<void> makeRoom();
+    std::vector<Leaving> fullest();
     Result<void> writeBlock(size_t bin, const std::vector<std::byte>& records);
+    Result<BlockHeader> headerAt(uint64_t offset) const;
     /// Whether a block is not coded: it has as many bytes as its records.
     [[nodiscard]] bool isPlain(uint32_t records, uint32_t storedBytes) const {
         return storedBytes == uint64_t{records} * recordBytes_;
     }
+    [[nodiscard]] uint64_t openLimit() const;
 
     TempSpace& space_;
     TempFile file_;
-    size_t recordBytes_, blockRecords_;
-    std::vector<std::vector<std::byte>> open_;
-    std::vector<std::vector<Block>> blocks_;
-    std::vector<uint64_t> counts_;
-    std::mutex mutex_;
+    size_t recordBytes_;
+    uint64_t bufferBytes_;
+    std::vector<Bin> bins_;
+    uint64_t open_ = 0, leaving_ = 0;  ///< bytes of open blocks, and of those that makeRoom is writing
+    std::mutex mutex_;                 ///< of the above
+    std::condition_variable written_;
+    std::mutex chainMutex_;  ///< held while a block is appended and becomes its bin's last
 };
 
 template <class Record>
@@ -89,6 +121,7 @@ public:
     [[nodiscard]] const RawBins& raw() const { return raw_; }
     [[nodiscard]] uint64_t count(size_t bin) const { return raw_.count(bin); }
 
+    [[nodiscard]] Result<std::vector<RawBins::Block>> blocks(size_t bin) const { return raw_.blocks(bin); }
     /// Returns one block's records. Any thread.
     Result<std::vector<Record>> read(const RawBins::Block& block) const {
         std::vector<Record> records(block.records);

@@ -8,6 +8,7 @@
 #include <thread>
 
 #include <gtest/gtest.h>
+#include <malloc.h>
 
 #include "tests/support/test_folder.h"
 
@@ -63,7 +64,9 @@ protected:
             ASSERT_TRUE(loaded.ok()) << loaded.error().line();
             ASSERT_TRUE(*loaded == all[bin]) << bin;
             std::vector<Record> byBlock;
-            for (const RawBins::Block& block : bins.raw().blocks(bin)) {
+            const auto blocks = bins.blocks(bin);
+            ASSERT_TRUE(blocks.ok()) << blocks.error().line();
+            for (const RawBins::Block& block : *blocks) {
                 const auto part = bins.read(block);
                 ASSERT_TRUE(part.ok());
                 byBlock.insert(byBlock.end(), part->begin(), part->end());
@@ -104,6 +107,94 @@ TEST_F(Bins, MoreBinsThanExpected) {
     expectHolds(bins, all);
     EXPECT_EQ(bins.count(1000), 0u);
     EXPECT_TRUE(bins.load(1000)->empty());
+}
+
+TEST_F(Bins, BlocksAreReadInTheOrderOfTheFile) {
+    TempSpace space(folder_ / "temp", 0);
+    RecordBins<Record> bins(space, "bins", 4, 1 << 16);
+    All all = fill(bins, 4, 30000, 9);
+    ASSERT_TRUE(bins.raw().flush().ok());
+    std::vector<Record> have, want;
+    uint64_t at = 0;
+    while (at < bins.raw().bytes()) {
+        const auto block = bins.raw().blockAt(at);
+        ASSERT_TRUE(block.ok()) << block.error().line();
+        const auto part = bins.read(*block);
+        ASSERT_TRUE(part.ok());
+        have.insert(have.end(), part->begin(), part->end());
+        at = block->end;
+    }
+    EXPECT_EQ(at, bins.raw().bytes());
+    EXPECT_FALSE(bins.raw().blockAt(at).ok());
+    EXPECT_FALSE(bins.raw().blockAt(1).ok());
+    for (const auto& each : all) want.insert(want.end(), each.begin(), each.end());
+    std::sort(have.begin(), have.end());
+    std::sort(want.begin(), want.end());
+    EXPECT_TRUE(have == want);
+}
+
+TEST_F(Bins, ManyBinsStayWithinTheirMemory) {
+    // A billion triangles under 150 MB are some 8,000 bins; here are more. Records come in runs of a few, in bins at
+    // random, which is the worst order.
+    constexpr size_t kBins = 100000, kRecords = 3000000;
+    constexpr uint64_t kBufferBytes = 12 << 20;
+    struct Parcel {
+        uint32_t word[10];
+    };
+    const auto parcel = [](size_t bin, size_t i) {
+        return Parcel{{uint32_t(bin), uint32_t(i), 3, uint32_t(i / 7), uint32_t(bin * 5), 6, 7, 8, 9, 10}};
+    };
+    TempSpace space(folder_ / "temp", 0);
+    std::vector<uint32_t> next(kBins, 0);
+    const uint64_t before = mallinfo2().uordblks;
+    uint64_t most = 0;
+    RecordBins<Parcel> bins(space, "bins", kBins, kBufferBytes);
+    std::mt19937_64 random(3);
+    for (size_t i = 0, step = 0; i < kRecords; ++step) {
+        const size_t bin = random() % kBins;
+        std::vector<Parcel> run(1 + random() % 4);
+        for (Parcel& each : run) each = parcel(bin, next[bin]++);
+        ASSERT_TRUE(bins.append(bin, run).ok());
+        i += run.size();
+        if (step % 1024 == 0) most = std::max<uint64_t>(most, mallinfo2().uordblks - before);
+    }
+    EXPECT_LE(most, kBufferBytes * 11 / 10);
+    ASSERT_TRUE(bins.raw().flush().ok());
+    // Blocks are not crumbs: a header is less than a record.
+    EXPECT_LT(bins.raw().bytes(), kRecords * sizeof(Parcel));
+    uint64_t total = 0;
+    for (size_t bin = 0; bin < kBins; bin += 97) {
+        const auto loaded = bins.load(bin);
+        ASSERT_TRUE(loaded.ok()) << loaded.error().line();
+        ASSERT_EQ(loaded->size(), next[bin]);
+        for (size_t i = 0; i < loaded->size(); ++i) {
+            const Parcel want = parcel(bin, i);
+            ASSERT_EQ(std::memcmp(&(*loaded)[i], &want, sizeof want), 0) << bin;
+        }
+        total += loaded->size();
+    }
+    EXPECT_GT(total, 0u);
+}
+
+TEST_F(Bins, ThreadsAppendToManyBins) {
+    // Blocks of a bin that different threads write are chained whole.
+    constexpr size_t kBins = 3000, kThreads = 4;
+    TempSpace space(folder_ / "temp", 0);
+    RecordBins<Record> bins(space, "bins", kBins, 1 << 18);
+    std::vector<All> parts(kThreads);
+    std::vector<std::thread> threads;
+    for (size_t i = 0; i < kThreads; ++i) threads.emplace_back([&, i] { parts[i] = fill(bins, kBins, 60000, 70 + i); });
+    for (std::thread& thread : threads) thread.join();
+    ASSERT_TRUE(bins.raw().flush().ok());
+    for (size_t bin = 0; bin < kBins; ++bin) {
+        std::vector<Record> want;
+        for (const All& part : parts) want.insert(want.end(), part[bin].begin(), part[bin].end());
+        auto have = bins.load(bin);
+        ASSERT_TRUE(have.ok()) << have.error().line();
+        std::sort(want.begin(), want.end());
+        std::sort(have->begin(), have->end());
+        ASSERT_TRUE(*have == want) << bin;
+    }
 }
 
 TEST_F(Bins, ThreadsAppendTogether) {
@@ -209,7 +300,7 @@ TEST_F(Bins, TheIndexIsOfIntactHeadersOnly) {
         ASSERT_TRUE(bins.raw().sync().ok());
     }
     const std::string intact = contentOf(file);
-    for (size_t bit = 0; bit < 32 * 8; ++bit) {
+    for (size_t bit = 0; bit < 40 * 8; ++bit) {
         std::string damaged = intact;
         damaged[bit / 8] = char(damaged[bit / 8] ^ 1 << bit % 8);
         std::ofstream(file, std::ios::binary) << damaged;
