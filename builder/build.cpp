@@ -190,6 +190,7 @@ private:
             fields["partition"] = plan_.finest.first();
             fields["parted"] = plan_.pages.parted();
             fields["levels less"] = levelsLess_;
+            fields["pages"] = finestPages_;
             partitionRecorded_ = true;
         }
         VCP_TRY(journal_.record(space_.folder(), fields));
@@ -213,6 +214,8 @@ private:
         plan_.setPages(plan_.frame, FinestPages(plan_.gridOf(plan_.levels() - 1), done_.parted));
         setUpLevels();
         plan_.finest = PagePartition(done_.partition);
+        finestPages_ = done_.pages;
+        VCP_TRY(planForPages());
         partitionRecorded_ = true;
         pass_ = done_.pass;
         firstBin_ = done_.bin;
@@ -294,6 +297,13 @@ private:
         }
         plan_.finest = PagePartition(choice.counts, memory_.binTriangles);
         plan_.setPages(plan_.frame, std::move(choice.pages));
+        finestPages_ = choice.counts.size();
+        return planForPages();
+    }
+
+    Result<void> planForPages() {
+        VCP_TRY_ASSIGN(memory_, planPages(memory_, finestPages_, plan_.finest.bins()));
+        plan_.pageBytes = memory_.pageBytes;
         return {};
     }
 
@@ -306,8 +316,13 @@ private:
             .mayBeCoarser = plan_.hasSlabs && options_.cell <= 0,
             .marginCells = plan_.marginCells(),
             .uncounted = memory_.binTriangles,
+            .mostPages = memory_.mostCountedPages(),
             .progress = [&](double part) { return progress("sorting", kReadingShare + kDealingShare / 2 * part); }};
-        return arena_.execute([&] { return choosePages(choosing); });
+        auto choice = arena_.execute([&] { return choosePages(choosing); });
+        // A page that was counted has triangles; twice the memory counts twice as many.
+        if (!choice && choice.error().code == ErrorCode::Limit)
+            return tooLittleMemory(memory_, choice.error().message, 2 * (memory_.fixedBytes + memory_.usableBytes));
+        return choice;
     }
 
     Result<void> dealSoup() {
@@ -603,7 +618,7 @@ private:
     }
 
     const BuildOptions& options_;
-    const MemoryPlan memory_;
+    MemoryPlan memory_;
     ProgressMeter meter_;
     TempSpace space_;
     Journal journal_;
@@ -615,7 +630,8 @@ private:
 
     SoupMeasures measures_;
     LevelPlan plan_;
-    uint32_t levelsLess_ = 0;  ///< as chooseFrame took it
+    uint32_t levelsLess_ = 0;   ///< as chooseFrame took it
+    uint64_t finestPages_ = 0;  ///< that hold the mesh; 0 where these are so few that they were not counted
     BuildReport report_;
     WorkFiles files_;
     std::optional<MeshParts> parts_;  ///< once they are joined

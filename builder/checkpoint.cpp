@@ -14,7 +14,7 @@ namespace {
 using nlohmann::json;
 
 // Version of the temporary files; a build does not continue from another version's.
-constexpr int kTempVersion = 9;
+constexpr int kTempVersion = 10;
 
 json jsonOf(glm::dvec3 v) { return {v.x, v.y, v.z}; }
 
@@ -141,6 +141,7 @@ void readLevels(Fields& all, Recorded& recorded) {
     const uint64_t levelsLess = all.count("levels less");
     all.require(levelsLess < kMaxLevels);
     recorded.levelsLess = uint32_t(std::min<uint64_t>(levelsLess, kMaxLevels));
+    recorded.pages = all.count("pages");
     const json& pass = all.at("pass");
     const int levels = int(std::min<size_t>(recorded.files.spools.size(), kMaxLevels));
     const bool isPass = pass.is_number_integer() && pass >= -1 && pass <= levels;

@@ -43,6 +43,7 @@ struct Recorded {
     std::vector<uint64_t> partition;            ///< with "levels": where the deepest level's bins begin
     std::vector<std::vector<uint64_t>> parted;  ///< with "levels": FinestPages::parted()
     uint32_t levelsLess = 0;                    ///< with "levels": as chooseFrame takes it
+    uint64_t pages = 0;                         ///< with "levels": pages that hold the mesh, where they were counted
     int pass = 0;
     size_t bin = 0;
 };

@@ -9,6 +9,7 @@
 #include <numeric>
 #include <set>
 
+#include <fmt/format.h>
 #include <oneapi/tbb/enumerable_thread_specific.h>
 #include <oneapi/tbb/parallel_pipeline.h>
 #include <oneapi/tbb/task_arena.h>
@@ -112,13 +113,19 @@ struct CountVisit {
     const PageCounts& parted;  ///< the pages whose parts are counted; none: all pages are
     LatticeBox box;            ///< around them
     PageCounts& counts;
+    std::atomic<uint64_t>& counted;  ///< pages that all threads count
+    uint64_t mostPages;
 
     Result<void> operator()(const LatticeTriangle& t) {
         if (!parted.empty() && !box.touches(t)) return {};
         pages.forPagesNear(t.corner, marginCells, pages.base(), [&](uint32_t level, uint64_t code) {
-            if (parted.empty() || (level > pages.base() && parted.contains({level - 1, code >> 3})))
-                ++counts[{level, code}];
+            if (!parted.empty() && (level == pages.base() || !parted.contains({level - 1, code >> 3}))) return;
+            const auto [count, isNew] = counts.try_emplace({level, code}, 0);
+            ++count->second;
+            if (isNew) ++counted;
         });
+        if (counted > mostPages)
+            return Error{.code = ErrorCode::Limit, .message = fmt::format("more than {} pages", mostPages)};
         return {};
     }
     static Result<void> finish() { return {}; }
@@ -129,8 +136,9 @@ Result<PageCounts> countTriangles(const PageChoosing& choosing, const FinestPage
     const LatticeSnapper snapper(choosing.frame, nullptr, false);
     const LatticeBox box = boxOf(parted, pages.gridOf(pages.base()), choosing.marginCells);
     tbb::enumerable_thread_specific<PageCounts> parts;
+    std::atomic<uint64_t> counted = 0;
     VCP_TRY(forLatticeTriangles(choosing.soup, snapper, false, progress, [&] {
-        return CountVisit{pages, choosing.marginCells, parted, box, parts.local()};
+        return CountVisit{pages, choosing.marginCells, parted, box, parts.local(), counted, choosing.mostPages};
     }));
     PageCounts sums;
     for (const PageCounts& part : parts)

@@ -40,10 +40,12 @@ struct PageChoosing {
     bool mayBeCoarser;                     ///< whether another base level may be asked for
     double marginCells;                    ///< how far around it a page needs triangles
     uint64_t uncounted;                    ///< so few triangles need no count
+    uint64_t mostPages;                    ///< so many pages can be counted
     std::function<bool(double)> progress;  ///< as Dealing's
 };
 
-/// Chooses the pages that hold the mesh. Errors: Io, Cancelled.
+/// Chooses the pages that hold the mesh. Errors: Io, Cancelled; Limit (more pages than can be counted; the message
+/// lacks what to do).
 Result<PageChoice> choosePages(const PageChoosing& choosing);
 
 /// What is dealt. The calling arena's threads do the work.

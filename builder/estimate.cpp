@@ -2,6 +2,7 @@
 
 #include <sys/stat.h>
 #include <algorithm>
+#include <chrono>
 #include <limits>
 #include <thread>
 
@@ -9,6 +10,7 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
+#include "builder/build_sample.h"
 #include "builder/lattice/exact_sum.h"
 #include "builder/memory_plan.h"
 #include "builder/mesh/open_mesh.h"
@@ -18,21 +20,28 @@ namespace vcp {
 namespace {
 
 // Bytes of a triangle on the temporary disk (the soup while it is dealt, then the finest level's bins with what has
-// been built of it) and in the file (2.4 to 3.2 for scans, 4.7 with colour), and its time on one thread.
-constexpr double kTempBytesPerTriangle = 100, kFileBytesPerTriangle = 5, kSecondsPerTriangle = 5e-6;
+// been built of it) and in the file (2.4 to 3.2 for scans, 4.7 with colour), before anything is known of it.
+constexpr double kTempBytesPerTriangle = 100, kFileBytesPerTriangle = 5;
+// What colours from images add in the file; a sample has none.
+constexpr double kImageBytesPerTriangle = 2;
 // Bytes of a triangle in memory where there is room for all, 120 to 195 for scans, and what comes with the first ones.
 constexpr double kMemoryBytesPerTriangle = 200, kFirstMemoryBytes = 20e6;
 // A machine may be slower by so much than the one that the time was measured on.
 constexpr double kSlower = 4;
 
-/// Measures one input's triangles as far as their vertices fit memory.
+/// Measures one input's triangles as far as their vertices fit memory, and adds them to the sample.
 class Measurer {
 public:
-    Measurer(SoupMeasures& measures, uint64_t maxVertices) : measures_(measures), maxVertices_(maxVertices) {}
+    Measurer(SoupMeasures& measures, BuildSample& sample, uint64_t maxVertices)
+        : measures_(measures), sample_(sample), maxVertices_(maxVertices) {}
 
     void add(const MeshChunk& chunk) {
         const size_t room = size_t(std::min<uint64_t>(chunk.positions.size(), maxVertices_ - positions_.size()));
         positions_.insert(positions_.end(), chunk.positions.begin(), chunk.positions.begin() + ptrdiff_t(room));
+        if (!chunk.colours.empty()) {
+            colours_.resize(positions_.size() - room, Rgba8(255));
+            colours_.insert(colours_.end(), chunk.colours.begin(), chunk.colours.begin() + ptrdiff_t(room));
+        }
         for (const glm::dvec3& p : chunk.positions) {
             measures_.boundsMin = glm::min(measures_.boundsMin, p);
             measures_.boundsMax = glm::max(measures_.boundsMax, p);
@@ -50,6 +59,7 @@ public:
             if (twice > 0 && std::isfinite(twice) && std::isfinite(longest)) {
                 area_.add(twice / 2);
                 length_.add(longest);
+                sample_.add({{a, b, c}, {colourOf(t[0]), colourOf(t[1]), colourOf(t[2])}});
             } else {
                 ++measures_.degenerateTriangles;
             }
@@ -60,10 +70,16 @@ public:
     [[nodiscard]] uint64_t measured() const { return measured_; }
 
 private:
+    [[nodiscard]] Rgba8 colourOf(uint64_t vertex) const {
+        return vertex < colours_.size() ? colours_[vertex] : Rgba8(255);
+    }
+
     SoupMeasures& measures_;
+    BuildSample& sample_;
     uint64_t maxVertices_;
     uint64_t measured_ = 0;
     std::vector<glm::dvec3> positions_;
+    std::vector<Rgba8> colours_;  ///< of the first positions; white beyond
     ExactSum area_, length_;
 };
 
@@ -133,10 +149,12 @@ Result<BuildEstimate> estimateBuild(const BuildOptions& options) {
     m.boundsMax = -m.boundsMin;
     uint64_t measured = 0;
     MeshChunk chunk;
+    BuildSample sample;
+    const auto begins = std::chrono::steady_clock::now();
     VCP_TRY_ASSIGN(auto inputs, expandInputs(options.inputs));
     for (const auto& path : inputs) {
         VCP_TRY_ASSIGN(auto stream, openMesh(path, meshOptionsOf(options)));
-        Measurer measurer(m, plan.vertexBytes / sizeof(glm::dvec3));
+        Measurer measurer(m, sample, plan.vertexBytes / (sizeof(glm::dvec3) + sizeof(Rgba8)));
         for (;;) {
             VCP_TRY_ASSIGN(auto more, stream->next(chunk));
             if (!more) break;
@@ -158,12 +176,21 @@ Result<BuildEstimate> estimateBuild(const BuildOptions& options) {
                      .file = options.inputs.front().string()};
     m.area *= double(m.triangles) / double(measured);
     m.length *= double(m.triangles) / double(measured);
+    const double reading = std::chrono::duration<double>(std::chrono::steady_clock::now() - begins).count();
     VCP_TRY_ASSIGN(estimate.frame, chooseFrame(options, m));
+    estimate.warning = wideCellWarning(options, m);
+    BuildOptions whole = options;
+    if (options.errorIsRelative) whole.error *= glm::length(m.boundsMax - m.boundsMin);
+    const bool hasColour =
+        m.hasVertexColours && options.colour != ColourChoice::None && options.colour != ColourChoice::Texture;
+    VCP_TRY_ASSIGN(const auto figures, buildSample(whole, estimate.frame.cell, sample, hasColour));
     estimate.memoryBytes =
         std::min(estimate.memoryCap, fixedMemoryBytes(threads) +
                                          uint64_t(kFirstMemoryBytes + kMemoryBytesPerTriangle * double(m.triangles)));
-    estimate.fileBytes = expectedFileBytes(m.triangles);
-    estimate.seconds = kSecondsPerTriangle * double(m.triangles) / threads;
+    const bool hasImages =
+        m.hasMaterials && (options.colour == ColourChoice::Auto || options.colour == ColourChoice::Texture);
+    estimate.fileBytes = uint64_t((figures.fileBytes + (hasImages ? kImageBytesPerTriangle : 0)) * double(m.triangles));
+    estimate.seconds = reading + figures.seconds * double(m.triangles);
     // A checkpoint writes all that is held in memory.
     const bool mayCheckpoint = kSlower * estimate.seconds > options.checkpointSeconds;
     estimate.tempBytes = expectedTempBytes(m.triangles, mayCheckpoint ? 0 : plan.tempBytes);

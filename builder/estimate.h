@@ -1,8 +1,10 @@
-// What a build will need, before it begins: counts and bounds are read from the input, bytes and time are estimated
-// from builds of scans (docs/building.md).
+// What a build will need, before it begins: counts and bounds are read from the input, the file's bytes and the time
+// are those of a sample of it that is built (build_sample.h), temporary bytes and memory are estimated from builds of
+// scans (docs/building.md).
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <span>
 #include <string>
 
@@ -19,7 +21,8 @@ struct BuildEstimate {
     uint64_t memoryCap = 0;    ///< most bytes that it may take
     uint64_t tempBytes = 0;    ///< most bytes on the temporary disk at one time; 0: it will write nothing there
     uint64_t fileBytes = 0;
-    double seconds = 0;
+    double seconds = 0;  ///< on this machine as it is now
+    std::optional<std::string> warning;
     uint64_t freeTempBytes = 0, freeOutputBytes = 0;  ///< free bytes on the disks they would go to
 };
 
@@ -40,7 +43,7 @@ struct SpaceNeed {
 /// Checks that there is room for all of this at once; needs on the same disk are added up. Errors: Limit.
 Result<void> checkFreeSpace(std::span<const SpaceNeed> needs);
 
-/// Reads the inputs and writes nothing. Errors: as buildOctree's while reading.
+/// Reads the inputs, and builds a sample among the system's temporary files. Errors: as buildOctree's.
 Result<BuildEstimate> estimateBuild(const BuildOptions& options);
 
 }  // namespace vcp

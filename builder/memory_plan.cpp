@@ -1,6 +1,7 @@
 #include "builder/memory_plan.h"
 
 #include <algorithm>
+#include <cmath>
 #include <fstream>
 #include <limits>
 
@@ -22,6 +23,16 @@ constexpr uint64_t kLeastUsable = 96 * kMiB;
 
 // A bin's records, its mesh, and what the step to the coarser level needs; measured, with some room to spare.
 constexpr uint64_t kBinTriangleBytes = 260;
+
+// A page's directory entry, of 80 bytes: in the pages' list and in that of the surfaces, both with the coarser levels
+// and with room to grow, and at the end, alone, in the file's directory.
+constexpr uint64_t kPageEntryBytes = 240;
+
+// A page while it is counted: a node of a map for one of the threads, and of their sum.
+constexpr uint64_t kCountedPageBytes = 3 * 64;
+
+// Two sets of bins and a smaller one are open at a time; each may use half of its memory for the bins themselves.
+constexpr uint64_t kBytesOfBin = 40;
 
 /// Returns the bytes that a control group allows, or the largest number.
 uint64_t groupLimit() {
@@ -48,12 +59,36 @@ Result<MemoryPlan> planMemory(uint64_t memoryBytes, unsigned threads) {
                                    memoryBytes / kMiB, threads, (fixed + kLeastUsable) / kMiB + 1)};
     const uint64_t usable = memoryBytes - fixed;
     MemoryPlan plan;
+    plan.fixedBytes = fixed;
+    plan.usableBytes = usable;
     plan.vertexBytes = usable / 2;
     plan.tempBytes = usable / 6;
     plan.bufferBytes = usable / 16;
     // Pages get what temporary files, the next level's blocks and those of waiting triangles leave.
     plan.pageBytes = usable - plan.tempBytes - plan.bufferBytes * 5 / 4;
     plan.binTriangles = usable / 3 / kBinTriangleBytes;
+    return plan;
+}
+
+uint64_t MemoryPlan::mostCountedPages() const { return pageBytes / kCountedPageBytes; }
+
+Error tooLittleMemory(const MemoryPlan& plan, const std::string& what, uint64_t enoughBytes) {
+    return {.code = ErrorCode::Limit,
+            .message = fmt::format("{} need more memory than {} MiB; let the memory cap be {}M or more", what,
+                                   (plan.fixedBytes + plan.usableBytes) / kMiB, enoughBytes / kMiB + 1)};
+}
+
+Result<MemoryPlan> planPages(MemoryPlan plan, uint64_t pages, uint64_t bins) {
+    // A third: what is left holds a bin, and at the end what writing the directory takes.
+    const uint64_t directory = pages * kPageEntryBytes;
+    if (directory > plan.usableBytes / 3)
+        return tooLittleMemory(plan, fmt::format("{} pages", pages), plan.fixedBytes + 3 * directory);
+    // With more memory there are fewer bins.
+    const double few = double(plan.bufferBytes / 4 / 2 / kBytesOfBin);
+    if (double(bins) > few)
+        return tooLittleMemory(plan, fmt::format("{} bins", bins),
+                               plan.fixedBytes + uint64_t(double(plan.usableBytes) * std::sqrt(double(bins) / few)));
+    plan.pageBytes -= directory;
     return plan;
 }
 

@@ -49,6 +49,40 @@ TEST(MemoryPlan, TooLittleSaysWhatIsEnough) {
     }
 }
 
+TEST(MemoryPlan, TenBillionTrianglesFitOneGibibyte) {
+    // A scan has some 8,000 triangles a page, and each triangle lies in one or two bins.
+    for (const auto& [megabytes, triangles] : {std::pair(150, 1e9), std::pair(1024, 1e10)}) {
+        const auto plan = planMemory(uint64_t(megabytes) * kMiB, 2);
+        ASSERT_TRUE(plan.ok());
+        const auto bins = uint64_t(1.5 * triangles / double(plan->binTriangles));
+        const auto planned = planPages(*plan, uint64_t(triangles / 8000), bins);
+        ASSERT_TRUE(planned.ok()) << planned.error().line();
+        EXPECT_GE(planned->pageBytes, plan->binTriangles * 260);
+        EXPECT_LT(planned->pageBytes, plan->pageBytes);
+        EXPECT_GE(plan->mostCountedPages(), uint64_t(triangles / 8000));
+    }
+}
+
+TEST(MemoryPlan, TooManyPagesOrBinsSayWhatIsEnough) {
+    const auto plan = planMemory(256 * kMiB, 2);
+    ASSERT_TRUE(plan.ok());
+    const auto enough = [](const Error& error) {
+        EXPECT_EQ(error.code, ErrorCode::Limit);
+        const size_t at = error.line().find("memory cap be ");
+        EXPECT_NE(at, std::string::npos) << error.line();
+        return std::stoull(error.line().substr(at + 14));
+    };
+    const auto pages = planPages(*plan, 10000000, 1);
+    ASSERT_FALSE(pages.ok());
+    EXPECT_TRUE(planPages(*planMemory(enough(pages.error()) * kMiB, 2), 10000000, 1).ok());
+    const auto bins = planPages(*plan, 1, 1000000);
+    ASSERT_FALSE(bins.ok());
+    const auto more = planMemory(enough(bins.error()) * kMiB, 2);
+    ASSERT_TRUE(more.ok());
+    // Bins are as many as are needed for the triangles.
+    EXPECT_TRUE(planPages(*more, 1, uint64_t(1e6 * double(plan->binTriangles) / double(more->binTriangles))).ok());
+}
+
 TEST(MemoryPlan, DefaultIsPartOfTheMachine) { EXPECT_GT(defaultMemoryBytes(), 64 * kMiB); }
 
 }  // namespace

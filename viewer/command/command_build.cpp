@@ -85,7 +85,8 @@ Json toJson(const BuildEstimate& estimate) {
             {"free_temp_bytes", estimate.freeTempBytes},
             {"file_bytes", estimate.fileBytes},
             {"free_output_bytes", estimate.freeOutputBytes},
-            {"seconds", estimate.seconds}};
+            {"seconds", estimate.seconds},
+            {"warnings", estimate.warning ? Json::array({*estimate.warning}) : Json::array()}};
 }
 
 std::string summary(const BuildEstimate& estimate) {
@@ -99,6 +100,7 @@ std::string summary(const BuildEstimate& estimate) {
                         m.boundsMin.z, m.boundsMax.x, m.boundsMax.y, m.boundsMax.z);
     text += fmt::format("  cell        {}{}, {} levels\n", estimate.isAreaComplete ? "" : "about ",
                         formatLength(estimate.frame.cell), estimate.frame.levels);
+    if (estimate.warning) text += fmt::format("  {}\n", *estimate.warning);
     text += fmt::format("  memory      about {}, at most {}\n", formatBytes(estimate.memoryBytes),
                         formatBytes(estimate.memoryCap));
     text += estimate.tempBytes == 0 ? std::string("  temporary   nothing: it fits memory, and is soon done\n")
@@ -110,7 +112,7 @@ std::string summary(const BuildEstimate& estimate) {
     return text;
 }
 
-/// Reports what the build would need; nothing is written.
+/// Reports what the build would need; nothing is written but a sample, which goes again.
 Result<int> tell(const BuildOptions& options, bool asJson) {
     VCP_TRY_ASSIGN(const auto estimate, estimateBuild(options));
     if (asJson)

@@ -607,7 +607,8 @@ TEST_F(CommandLine, ADryRunIsNearWhatTheBuildThenTakes) {
         };
         near("memory_bytes", "peak_rss_bytes", 0.7, 2);  // which differs by a third from run to run
         near("temp_bytes", "temp_bytes", 0.6, 1.6);
-        near("file_bytes", "file_bytes", 1, 3);
+        near("file_bytes", "file_bytes", 0.8, 1.25);
+        EXPECT_GT(told["seconds"], 0);
         EXPECT_GE(told["memory_cap_bytes"], told["memory_bytes"]);
     }
 }
