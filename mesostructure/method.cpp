@@ -11,11 +11,21 @@ namespace vcp::meso {
 
 namespace {
 
-constexpr std::array<std::string_view, 12> kNames = {
-    "relief-binary", "relief-secant", "relief-secant-printed", "relief-illinois", "pyramid", "sphere", "dm",
-    "ddm",           "ddm-quadric",   "ddm-quadric-fitted",    "boxes",           "cells"};
-constexpr std::array<Refinement, 4> kRefinements = {Refinement::Binary, Refinement::Secant, Refinement::SecantAsPrinted,
-                                                    Refinement::Illinois};
+constexpr std::array<std::string_view, 13> kNames = {"relief-linear",
+                                                     "relief-binary",
+                                                     "relief-secant",
+                                                     "relief-secant-printed",
+                                                     "relief-illinois",
+                                                     "pyramid",
+                                                     "sphere",
+                                                     "dm",
+                                                     "ddm",
+                                                     "ddm-quadric",
+                                                     "ddm-quadric-fitted",
+                                                     "boxes",
+                                                     "cells"};
+constexpr std::array<Refinement, 5> kRefinements = {Refinement::None, Refinement::Binary, Refinement::Secant,
+                                                    Refinement::SecantAsPrinted, Refinement::Illinois};
 constexpr int kDefaultCells = 64;
 
 template <class T>
@@ -115,7 +125,8 @@ Result<Method> buildMethod(const Asset& asset, const Shape& shape, const MethodO
         if (name != "pyramid")
             method.relief = {.steps = options.steps,
                              .refinement = kRefinements[size_t(known - kNames.begin())],
-                             .refinements = options.refinements};
+                             .refinements = options.refinements,
+                             .tolerance = options.tolerance};
         return method;
     }
     const glm::ivec3 cells = cellsOf(asset, shape.extent(), options.cells);
@@ -137,12 +148,12 @@ Result<Method> buildMethod(const Asset& asset, const Shape& shape, const MethodO
     if (method.boxes && method.field) markSmallCells(*method.field, *method.boxes);
     if (isExact) return method;
     const Cones cones = name == "dm" ? Cones{1, 1} : options.cones;
+    const double cap = options.cap > 0 ? options.cap : cones.areSigns() ? 0.25 : 0.125;
     if (isOwn && asset.distances && asset.distances->cones.azimuth == cones.azimuth &&
-        asset.distances->cones.elevation == cones.elevation)
+        asset.distances->cones.elevation == cones.elevation && options.cap <= 0)
         method.distances = std::make_unique<DistanceMap>(*asset.distances);
     else
-        VCP_TRY(take(buildDistanceMap(*method.occupancy, {.cones = cones, .cap = cones.areSigns() ? 0.25 : 0.125}),
-                     method.distances));
+        VCP_TRY(take(buildDistanceMap(*method.occupancy, {.cones = cones, .cap = cap}), method.distances));
     if (name.starts_with("ddm-quadric")) {
         VCP_TRY(take(
             buildPatches(shape, *method.occupancy, name == "ddm-quadric" ? CrossingRule::Direct : CrossingRule::Fitted),

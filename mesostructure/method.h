@@ -44,10 +44,12 @@ struct MethodOptions {
     Cones cones{4, 1};  ///< cones of ddm, ddm-quadric and ddm-quadric-fitted
     int steps = 32;     ///< steps of relief mapping
     int refinements = 10;
+    float tolerance = ReliefOptions().tolerance;
+    double cap = 0;  ///< longest distance of dm, ddm, ddm-quadric and ddm-quadric-fitted, tiles; 0: 1/4, or 1/8
 };
 
-/// The names for height fields only: "relief-binary", "relief-secant", "relief-secant-printed", "relief-illinois",
-/// "pyramid". For all: "sphere", "dm", "ddm", "ddm-quadric", "ddm-quadric-fitted", "boxes", "cells".
+/// The names for height fields only: "relief-linear", "relief-binary", "relief-secant", "relief-secant-printed",
+/// "relief-illinois", "pyramid". For all: "sphere", "dm", "ddm", "ddm-quadric", "ddm-quadric-fitted", "boxes", "cells".
 std::span<const std::string_view> methodNames();
 /// Whether a method of that name marches the asset: some march only height fields.
 bool methodFits(std::string_view name, const Asset& asset);

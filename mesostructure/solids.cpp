@@ -61,6 +61,12 @@ double beads(dvec3 p) {
                     lattice(p, 4, 4, 0, [](dvec3 q, int, int) { return glm::length(q - dvec3(0, 0, 0.13)) - 0.1; }));
 }
 
+// A bead as high as its tile is wide: in few cells it is still many cells wide.
+double bead(dvec3 p) {
+    return std::min(floorBelow(p, 0.12),
+                    lattice(p, 1, 1, 0, [](dvec3 q, int, int) { return glm::length(q - dvec3(0, 0, 0.52)) - 0.4; }));
+}
+
 double ball(dvec3 p) {
     return lattice(p, 1, 1, 0, [](dvec3 q, int, int) { return glm::length(q - dvec3(0, 0, 0.1)) - 0.06; });
 }
@@ -169,10 +175,11 @@ double blades(dvec3 p, uint32_t seed) {
     return std::min(f, floorBelow(p, 0.02));
 }
 
-constexpr std::array<std::string_view, 11> kNames{"beads",  "ball",   "chain",  "weave",  "bars",  "scales",
-                                                  "kitten", "flakes", "gyroid", "sponge", "blades"};
+constexpr std::array<std::string_view, 12> kNames{"bead",   "beads",  "ball",   "chain",  "weave",  "bars",
+                                                  "scales", "kitten", "flakes", "gyroid", "sponge", "blades"};
 
 std::function<double(dvec3)> fieldNamed(std::string_view name, uint32_t seed) {
+    if (name == "bead") return bead;
     if (name == "beads") return beads;
     if (name == "ball") return ball;
     if (name == "chain") return chain;
@@ -245,7 +252,7 @@ private:
 std::span<const std::string_view> solidNames() { return kNames; }
 
 Result<Solid> makeSolid(std::string_view name, uint32_t seed) {
-    Solid solid{{1, 1, name == "kitten" ? 0.5 : 0.25}, fieldNamed(name, seed)};
+    Solid solid{{1, 1, name == "bead" ? 1 : name == "kitten" ? 0.5 : 0.25}, fieldNamed(name, seed)};
     if (!solid.field) return Error{.code = ErrorCode::Usage, .message = fmt::format("there is no solid \"{}\"", name)};
     return solid;
 }

@@ -15,7 +15,8 @@ std::span<const std::string_view> heightFieldNames();
 /// Makes a square map of `texels` an edge, from 8 to kMaxGridEdge. Errors: Usage (no such name, bad size).
 Result<HeightMap> makeHeightField(std::string_view name, int texels, uint32_t seed);
 
-/// The names are "beads", "ball", "chain", "weave", "bars", "scales", "kitten", "flakes", "gyroid", "sponge", "blades".
+/// The names are "bead", "beads", "ball", "chain", "weave", "bars", "scales", "kitten", "flakes", "gyroid", "sponge",
+/// "blades".
 std::span<const std::string_view> solidNames();
 
 /// A solid by a formula. `field` is above 0 outside and changes by at most 1 a unit of length.

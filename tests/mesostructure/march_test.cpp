@@ -257,6 +257,30 @@ TEST(March, ReliefRefinementsFindTheBracketsRoot) {
     EXPECT_GT(mean[size_t(Refinement::SecantAsPrinted)], mean[size_t(Refinement::Secant)]);
 }
 
+TEST(March, TheToleranceEndsTheRefinementEarly) {
+    const HeightMap map = *makeHeightField("fbm", 128, 1);
+    const auto shape = test::heights(map);
+    double error[3] = {};
+    uint64_t fetches[3] = {};
+    constexpr float kTolerances[3] = {0.01f, 0.001f, 0};
+    for (int k = 0; k < 3; ++k) {
+        const auto marcher =
+            reliefMarcher(map, {.steps = 64, .refinement = Refinement::Binary, .tolerance = kTolerances[k]});
+        std::mt19937 random(4);
+        for (int i = 0; i < 1000; ++i) {
+            const MarchRay ray = test::rayFromTop(random, shape->extent(), 45);
+            const TruthHit truth = shape->trace(ray.origin, ray.direction, 100);
+            const MarchResult found = marcher->march(ray);
+            fetches[k] += found.fetches;
+            error[k] += std::min(std::abs(found.t - truth.t) * 128, 1.0);
+        }
+    }
+    EXPECT_LT(error[1], 0.6 * error[0]);
+    EXPECT_LT(error[2], error[1]);
+    EXPECT_GT(fetches[1], fetches[0]);
+    EXPECT_GT(fetches[2], fetches[1]);
+}
+
 TEST(March, RefusesWhatDoesNotFit) {
     const HeightMap map = *makeHeightField("fbm", 30, 1);
     const auto shape = test::heights(map);

@@ -110,9 +110,22 @@ struct Entry {
 
 std::vector<Entry> entries() {
     std::vector<Entry> all;
+    constexpr std::array kSteps = {5, 10, 32, 64, 256};
+    for (const int steps : kSteps)
+        all.push_back({fmt::format("steps {}", steps), steps == 32, {.name = "relief-linear", .steps = steps}});
     for (const char* name : {"relief-binary", "relief-secant", "relief-secant-printed", "relief-illinois"})
-        for (const int steps : {5, 10, 32, 64, 256})
+        for (const int steps : kSteps) {
             all.push_back({fmt::format("steps {}", steps), steps == 32, {.name = name, .steps = steps}});
+            // The tolerance of the listing ends the refinement early.
+            for (const float tolerance : {1e-3f, 0.0f})
+                all.push_back({fmt::format("steps {} tolerance {}", steps, tolerance),
+                               false,
+                               {.name = name, .steps = steps, .tolerance = tolerance}});
+        }
+    for (const int steps : kSteps)
+        all.push_back({fmt::format("steps {} once", steps),
+                       false,
+                       {.name = "relief-secant", .steps = steps, .refinements = 1, .tolerance = 0}});
     all.push_back({"exact", true, {.name = "pyramid"}});
     for (const char* name : {"sphere", "dm"})
         for (const int cells : {32, 64, 128})
@@ -123,6 +136,11 @@ std::vector<Entry> entries() {
                        {.name = "ddm", .cells = 64, .cones = cones}});
     for (const int cells : {32, 128})
         all.push_back({fmt::format("4x1 grid {}", cells), false, {.name = "ddm", .cells = cells}});
+    for (const char* name : {"dm", "ddm"})
+        for (const double cap : {0.5, 1.0})
+            all.push_back({fmt::format("{}grid 128 cap {}", name == std::string_view("ddm") ? "4x1 " : "", cap),
+                           false,
+                           {.name = name, .cells = 128, .cap = cap}});
     for (const int cells : {16, 32, 64, 128})
         all.push_back({fmt::format("4x1 grid {}", cells), cells == 64, {.name = "ddm-quadric", .cells = cells}});
     for (const int cells : {16, 32, 64})
@@ -281,8 +299,8 @@ Result<BenchMesoReport> benchMeso(const BenchMesoOptions& options) {
     VCP_TRY(knows("view", options.views, mesoViewNames()));
     std::vector<std::string> assets = options.assets;
     if (assets.empty())
-        assets = {"fbm",   "hemispheres", "bricks", "maze",   "needle", "beads",
-                  "chain", "weave",       "ball",   "scales", "kitten"};
+        assets = {"fbm",   "hemispheres", "bricks", "maze", "needle", "bead",
+                  "beads", "chain",       "weave",  "ball", "scales", "kitten"};
     std::unique_ptr<MesoMarcher> renderer;
     if (options.device) {
         VCP_TRY_ASSIGN(renderer, MesoMarcher::create({.device = *options.device}));
