@@ -75,8 +75,10 @@ TEST_F(MesoSurfaces, PlateauOnAQuadIsAPlane) {
         const auto normals = *renderer_->readNormals();
         // Distance maps alone show whole cells.
         const bool isCells = method == "dm" || method == "ddm";
-        // A hundredth of the slab for relief mapping; what a sampled distance may be too long for sphere tracing.
+        // A step for linear search, a hundredth of the slab for relief mapping; what a sampled distance may be too long
+        // for sphere tracing.
         const double tolerance = isCells                        ? 0.13
+                                 : method == "relief-linear"    ? 0.5 / 32
                                  : method.starts_with("relief") ? 0.006
                                  : method == "sphere"           ? 0.07
                                                                 : 2e-3;
