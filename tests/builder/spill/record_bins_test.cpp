@@ -136,7 +136,7 @@ TEST_F(Bins, BlocksAreReadInTheOrderOfTheFile) {
 TEST_F(Bins, ManyBinsStayWithinTheirMemory) {
     // A billion triangles under 150 MB are some 8,000 bins; here are more. Records come in runs of a few, in bins at
     // random, which is the worst order.
-    constexpr size_t kBins = 100000, kRecords = 3000000;
+    constexpr size_t kBins = 100000, kRecords = 500000;
     constexpr uint64_t kBufferBytes = 12 << 20;
     struct Parcel {
         uint32_t word[10];
