@@ -38,34 +38,6 @@ dvec3 faceNormal(const BaseSurface& surface, size_t triangle) {
     return length > 0 ? n / length : dvec3(0);
 }
 
-std::vector<dvec3> directionsOf(const BaseSurface& surface) {
-    std::vector<dvec3> sums(surface.positions.size(), dvec3(0));
-    std::vector<double> least(surface.positions.size(), 1);
-    const auto each = [&](const auto& use) {
-        for (size_t i = 0; i < surface.triangles.size(); ++i) {
-            const dvec3 normal = faceNormal(surface, i);
-            if (normal != dvec3(0)) use(surface.triangles[i], normal);
-        }
-    };
-    each([&](const std::array<uint32_t, 3>& t, dvec3 normal) {
-        for (int k = 0; k < 3; ++k) {
-            const dvec3 p = surface.positions[t[k]], a = glm::normalize(surface.positions[t[(k + 1) % 3]] - p),
-                        b = glm::normalize(surface.positions[t[(k + 2) % 3]] - p);
-            sums[t[k]] += normal * std::acos(std::clamp(glm::dot(a, b), -1.0, 1.0));
-        }
-    });
-    for (dvec3& sum : sums)
-        if (const double length = glm::length(sum); length > 1e-6)
-            sum /= length;
-        else
-            sum = dvec3(0);
-    each([&](const std::array<uint32_t, 3>& t, dvec3 normal) {
-        for (const uint32_t corner : t) least[corner] = std::min(least[corner], glm::dot(sums[corner], normal));
-    });
-    for (size_t i = 0; i < sums.size(); ++i) sums[i] /= std::max(least[i], 1 / kLongest);
-    return sums;
-}
-
 /// Which edges of which triangles have a neighbour that continues the same map, whole tiles apart.
 class Joins {
 public:
@@ -111,7 +83,7 @@ class PieceMaker {
 public:
     PieceMaker(const BaseSurface& surface, double height, dvec3 extent, Shell& shell)
         : surface_(surface),
-          directions_(directionsOf(surface)),
+          directions_(shellDirections(surface)),
           joins_(surface, extent),
           height_(height),
           tileHeight_(extent.z),
@@ -256,6 +228,34 @@ bool isFinite(const BaseSurface& surface) {
 }
 
 }  // namespace
+
+std::vector<dvec3> shellDirections(const BaseSurface& surface) {
+    std::vector<dvec3> sums(surface.positions.size(), dvec3(0));
+    std::vector<double> least(surface.positions.size(), 1);
+    const auto each = [&](const auto& use) {
+        for (size_t i = 0; i < surface.triangles.size(); ++i) {
+            const dvec3 normal = faceNormal(surface, i);
+            if (normal != dvec3(0)) use(surface.triangles[i], normal);
+        }
+    };
+    each([&](const std::array<uint32_t, 3>& t, dvec3 normal) {
+        for (int k = 0; k < 3; ++k) {
+            const dvec3 p = surface.positions[t[k]], a = glm::normalize(surface.positions[t[(k + 1) % 3]] - p),
+                        b = glm::normalize(surface.positions[t[(k + 2) % 3]] - p);
+            sums[t[k]] += normal * std::acos(std::clamp(glm::dot(a, b), -1.0, 1.0));
+        }
+    });
+    for (dvec3& sum : sums)
+        if (const double length = glm::length(sum); length > 1e-6)
+            sum /= length;
+        else
+            sum = dvec3(0);
+    each([&](const std::array<uint32_t, 3>& t, dvec3 normal) {
+        for (const uint32_t corner : t) least[corner] = std::min(least[corner], glm::dot(sums[corner], normal));
+    });
+    for (size_t i = 0; i < sums.size(); ++i) sums[i] /= std::max(least[i], 1 / kLongest);
+    return sums;
+}
 
 Result<Shell> buildShell(const BaseSurface& surface, double height, dvec3 extent) {
     const auto fail = [](ErrorCode code, const char* message) { return Error{.code = code, .message = message}; };

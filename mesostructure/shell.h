@@ -49,4 +49,8 @@ struct Shell {
 /// finite, also in single precision); Limit (2^24 pieces).
 Result<Shell> buildShell(const BaseSurface& surface, double height, glm::dvec3 extent);
 
+/// Returns the direction of each position in heights, of at most 3: what a shell's corners are moved along. 0 where the
+/// normals cancel, or where no triangle with area is.
+std::vector<glm::dvec3> shellDirections(const BaseSurface& surface);
+
 }  // namespace vcp::meso

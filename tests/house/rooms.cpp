@@ -29,11 +29,14 @@ const std::vector<Room>& rooms() {
 
         {"mesostructure", {"octree/"}},
         {"mesostructure/base", {"octree/", "mesostructure"}},
+        {"mesostructure/remesh", {"octree/", "mesostructure", "mesostructure/base"}},
         {"streaming", {"octree/"}},
         {"render/shared", {}},
         {"render/host", {"octree/", "render/shared"}},
         {"render/pages", {"octree/", "streaming", "render/shared"}},
-        {"render", {"octree/", "mesostructure", "streaming", "render/shared", "render/host", "render/pages"}},
+        {"render",
+         {"octree/", "mesostructure", "mesostructure/remesh", "streaming", "render/shared", "render/host",
+          "render/pages"}},
 
         {"viewer/annotation", {"octree/", "render"}},
         {"viewer/camera", {"octree/", "render"}},

@@ -1,0 +1,110 @@
+// Filter levels of a height map (Gumhold and Huettner 1999, 4): heights at the corners of ever coarser grids, and the
+// range of the map's heights in ever larger blocks, which bounds what a level may be off.
+//
+// Heights are parts of the map's range, from 0 to 1. Level 0 is the map; a level has half the edge of the one below,
+// at least 1. Levels repeat as the map does; corner (i, j) of a level lies at the part (i, j) / size of the tile.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include <glm/vec2.hpp>
+
+#include "mesostructure/shape.h"
+#include "octree/io/result.h"
+
+namespace vcp::meso {
+
+enum class LevelFit {
+    Sampled,   ///< heights of the map at the corners
+    Averaged,  ///< means over the corners' cells
+    Printed,   ///< least volume, as printed (4.2): differences of the volume, steps of falling size for all at once
+    Least,     ///< least volume within the range of the map around each corner, to the optimum
+};
+
+struct HeightLevel {
+    glm::ivec2 size{0};
+    std::vector<float> heights;  ///< row by row, x fastest
+
+    [[nodiscard]] float at(int x, int y) const {
+        return heights[size_t(wrapped(x, size.x)) + size_t(size.x) * size_t(wrapped(y, size.y))];
+    }
+};
+
+/// What fitting one level did. Volumes are mean distances between level and map, in parts of the range.
+struct LevelVolume {
+    double averaged = 0;  ///< of the averaged heights, from which fitting starts
+    double fitted = 0;
+    double bound = 0;  ///< what no heights in their ranges come below (LevelFit::Least; else 0)
+    int iterations = 0;
+};
+
+struct LevelFitOptions {
+    LevelFit fit = LevelFit::Least;
+    double gap = 0.01;         ///< LevelFit::Least ends where volume and bound differ by this part
+    int mostIterations = 400;  ///< for each level
+};
+
+struct HeightRange {
+    float least = 0, most = 0;
+};
+
+class HeightLevels {
+public:
+    /// Errors: InvalidInput (a map without texels, of another size than it says, or without a range).
+    static Result<HeightLevels> build(const HeightMap& map, const LevelFitOptions& options = {});
+
+    [[nodiscard]] const std::vector<HeightLevel>& levels() const { return levels_; }
+    [[nodiscard]] const std::vector<LevelVolume>& volumes() const { return volumes_; }  ///< for each level
+    [[nodiscard]] double rows() const { return rows_; }  ///< extent of the tile along y, tile units
+    [[nodiscard]] uint64_t bytes() const;
+
+    /// Returns the height of a level at a place in tile units, bilinear.
+    template <class Real>
+    [[nodiscard]] Real height(int level, glm::vec<2, Real> at) const;
+    /// Returns the height at a place for a footprint of `texels` texels' edge: of the two levels whose texels are as
+    /// large, by the logarithm.
+    template <class Real>
+    [[nodiscard]] Real height(glm::vec<2, Real> at, Real texels) const;
+    /// Returns what the map's heights range over in a box of places in tile units.
+    [[nodiscard]] HeightRange range(glm::dvec2 low, glm::dvec2 high) const;
+
+private:
+    void addRanges();
+    struct Blocks {
+        glm::ivec2 size{0};
+        std::vector<HeightRange> ranges;
+    };
+    std::vector<HeightLevel> levels_;
+    std::vector<LevelVolume> volumes_;
+    std::vector<Blocks> blocks_;  ///< of 2^i map cells' edge
+    double rows_ = 1;
+};
+
+/// Fits one level of a map's level 0. `volume` gets what was done.
+HeightLevel fitLevel(const HeightLevel& map, glm::ivec2 size, const LevelFitOptions& options, LevelVolume& volume);
+
+/// Returns the mean distance between a level and the map, at the map's texels.
+double levelVolume(const HeightLevel& map, const HeightLevel& level);
+
+template <class Real>
+Real HeightLevels::height(int level, glm::vec<2, Real> at) const {
+    const HeightLevel& from = levels_[size_t(level)];
+    const Real x = at.x * Real(from.size.x), y = at.y * Real(double(from.size.y) / rows_);
+    const Real left = std::floor(x), lower = std::floor(y), u = x - left, v = y - lower;
+    const int i = int(left), j = int(lower);
+    const Real low = Real(from.at(i, j)) * (1 - u) + Real(from.at(i + 1, j)) * u;
+    const Real high = Real(from.at(i, j + 1)) * (1 - u) + Real(from.at(i + 1, j + 1)) * u;
+    return low * (1 - v) + high * v;
+}
+
+template <class Real>
+Real HeightLevels::height(glm::vec<2, Real> at, Real texels) const {
+    const Real top = Real(levels_.size() - 1);
+    const Real level = texels > 1 ? std::min(std::log2(texels), top) : Real(0), whole = std::floor(level);
+    const Real part = level - whole, fine = height(int(whole), at);
+    if (part <= 0) return fine;
+    return fine * (1 - part) + height(int(whole) + 1, at) * part;
+}
+
+}  // namespace vcp::meso

@@ -1,0 +1,153 @@
+// Filter levels of height maps: least volumes against their bound, ranges against a slow search.
+#include "mesostructure/remesh/height_levels.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <random>
+
+#include <gtest/gtest.h>
+
+#include "mesostructure/solids.h"
+
+namespace vcp::meso {
+namespace {
+
+HeightMap mapOf(std::string_view name, int texels = 64) {
+    auto made = makeHeightField(name, texels, 1);
+    EXPECT_TRUE(made.ok());
+    return *std::move(made);
+}
+
+HeightLevels levelsOf(const HeightMap& map, const LevelFitOptions& options = {}) {
+    auto made = HeightLevels::build(map, options);
+    EXPECT_TRUE(made.ok()) << made.error().line();
+    return *std::move(made);
+}
+
+TEST(HeightLevels, HalveDownToOneHeight) {
+    HeightMap map{{24, 5}, 0.5, std::vector<uint16_t>(120, 32768)};
+    const HeightLevels levels = levelsOf(map);
+    std::vector<glm::ivec2> sizes;
+    for (const HeightLevel& level : levels.levels()) {
+        sizes.push_back(level.size);
+        EXPECT_EQ(level.heights.size(), size_t(level.size.x) * size_t(level.size.y));
+        for (const float height : level.heights) EXPECT_NEAR(height, 32768 / 65535.0, 1e-6);
+    }
+    EXPECT_EQ(sizes, (std::vector<glm::ivec2>{{24, 5}, {12, 2}, {6, 1}, {3, 1}, {1, 1}}));
+    EXPECT_NEAR(levels.height(2, glm::dvec2(0.3, 0.1)), 32768 / 65535.0, 1e-6);
+}
+
+TEST(HeightLevels, LevelNoughtIsTheMap) {
+    const HeightMap map = mapOf("ridged");
+    const HeightLevels levels = levelsOf(map, {.fit = LevelFit::Averaged});
+    for (int j = -3; j < 70; j += 7)
+        for (int i = -5; i < 70; i += 3)
+            EXPECT_NEAR(levels.height(glm::dvec2(i, j) / 64.0, 0.5), map.texel(i, j) / 65535.0, 1e-6);
+}
+
+TEST(HeightLevels, FootprintsBetweenTwoLevelsGetHeightsBetween) {
+    const HeightLevels levels = levelsOf(mapOf("fbm"));
+    const glm::dvec2 at(0.37, 0.81);
+    const double fine = levels.height(2, at), coarse = levels.height(3, at);
+    EXPECT_NEAR(levels.height(at, 4.0), fine, 1e-9);
+    EXPECT_NEAR(levels.height(at, 8.0), coarse, 1e-9);
+    EXPECT_NEAR(levels.height(at, 4 * std::sqrt(2.0)), 0.5 * (fine + coarse), 1e-9);
+    EXPECT_NEAR(levels.height(at, 1e30), levels.height(int(levels.levels().size()) - 1, at), 1e-9);
+}
+
+/// The optimum is certified: volume and bound meet, and no other fit comes below the bound.
+TEST(HeightLevels, LeastVolumesAreProvedLeast) {
+    for (const auto name : {"fbm", "ridged", "hemispheres", "blocks"}) {
+        SCOPED_TRACE(name);
+        const HeightMap map = mapOf(name);
+        const HeightLevels least = levelsOf(map, {.fit = LevelFit::Least, .gap = 0.005, .mostIterations = 20000});
+        const HeightLevels averaged = levelsOf(map, {.fit = LevelFit::Averaged});
+        for (size_t level = 1; level <= 3; ++level) {
+            SCOPED_TRACE(level);
+            const LevelVolume& volume = least.volumes()[level];
+            EXPECT_GE(volume.fitted, volume.bound - 1e-9);
+            EXPECT_LE(volume.fitted - volume.bound, 0.005 * volume.fitted + 1e-9);
+            EXPECT_LT(volume.fitted, volume.averaged);
+            EXPECT_NEAR(volume.fitted, levelVolume(least.levels()[0], least.levels()[level]), 1e-9);
+            EXPECT_NEAR(volume.averaged, levelVolume(averaged.levels()[0], averaged.levels()[level]), 1e-9);
+        }
+    }
+}
+
+/// Every change of one height within its range makes the volume larger, or leaves it within the gap.
+TEST(HeightLevels, NoSingleHeightImprovesALeastVolume) {
+    const HeightLevels levels = levelsOf(mapOf("ridged", 32), {.gap = 1e-4, .mostIterations = 50000});
+    const HeightLevel& map = levels.levels()[0];
+    const double volume = levels.volumes()[2].fitted;
+    for (size_t i = 0; i < levels.levels()[2].heights.size(); ++i)
+        for (const float by : {-0.02f, 0.02f}) {
+            HeightLevel moved = levels.levels()[2];
+            moved.heights[i] += by;
+            const int x = int(i) % moved.size.x * 4, y = int(i) / moved.size.x * 4;
+            float least = 1, most = 0;
+            for (int j = y - 3; j <= y + 3; ++j)
+                for (int k = x - 3; k <= x + 3; ++k)
+                    least = std::min(least, map.at(k, j)), most = std::max(most, map.at(k, j));
+            if (moved.heights[i] < least || moved.heights[i] > most) continue;
+            EXPECT_GE(levelVolume(map, moved), volume * (1 - 1e-3)) << i;
+        }
+}
+
+TEST(HeightLevels, LeastVolumesDoNotOvershoot) {
+    for (const auto name : {"hemispheres", "blocks", "needle"}) {
+        const HeightMap map = mapOf(name);
+        const auto [low, high] = std::ranges::minmax(map.texels);
+        const HeightLevels levels = levelsOf(map);
+        for (const HeightLevel& level : levels.levels())
+            for (const float height : level.heights) {
+                ASSERT_GE(height, low / 65535.0f - 1e-6f) << name;
+                ASSERT_LE(height, high / 65535.0f + 1e-6f) << name;
+            }
+    }
+}
+
+TEST(HeightLevels, ThePrintedFitFallsFromTheMeans) {
+    const HeightLevels levels = levelsOf(mapOf("ridged"), {.fit = LevelFit::Printed, .mostIterations = 4000});
+    const HeightLevels least = levelsOf(mapOf("ridged"), {.fit = LevelFit::Least, .mostIterations = 4000});
+    for (size_t level = 1; level <= 3; ++level) {
+        EXPECT_LT(levels.volumes()[level].fitted, 0.95 * levels.volumes()[level].averaged) << level;
+        // Without ranges it may come below the least volume within them, but not by much here.
+        EXPECT_GT(levels.volumes()[level].fitted, 0.9 * least.volumes()[level].bound) << level;
+    }
+}
+
+TEST(HeightLevels, RangesHoldAllThatIsInABox) {
+    for (const glm::ivec2 size : {glm::ivec2(64, 64), glm::ivec2(23, 9)}) {
+        HeightMap map{size, 0.3, {}};
+        std::mt19937 random(7);
+        for (int i = 0; i < size.x * size.y; ++i) map.texels.push_back(uint16_t(random()));
+        const HeightLevels levels = levelsOf(map, {.fit = LevelFit::Averaged});
+        for (uint32_t seed = 0; seed < 2000; ++seed) {
+            std::mt19937 draw(seed);
+            std::uniform_real_distribution<double> place(-2, 2), edge(0, seed % 2 == 0 ? 0.05 : 0.6);
+            const glm::dvec2 low(place(draw), place(draw)), high = low + glm::dvec2(edge(draw), edge(draw));
+            const HeightRange range = levels.range(low, high);
+            for (int j = 0; j <= 6; ++j)
+                for (int i = 0; i <= 6; ++i) {
+                    const double height = levels.height(0, low + (high - low) * glm::dvec2(i, j) / 6.0);
+                    ASSERT_GE(height, range.least - 1e-6) << seed;
+                    ASSERT_LE(height, range.most + 1e-6) << seed;
+                }
+        }
+        const HeightRange all = levels.range({0, 0}, {5, 5});
+        const auto [low, high] = std::ranges::minmax(map.texels);
+        EXPECT_FLOAT_EQ(all.least, low / 65535.0f);
+        EXPECT_FLOAT_EQ(all.most, high / 65535.0f);
+    }
+}
+
+TEST(HeightLevels, RefuseMapsThatAreNone) {
+    EXPECT_EQ(HeightLevels::build({{2, 2}, 1, {1, 2, 3}}).error().code, ErrorCode::InvalidInput);
+    EXPECT_EQ(HeightLevels::build({{0, 0}, 1, {}}).error().code, ErrorCode::InvalidInput);
+    EXPECT_EQ(HeightLevels::build({{1, 1}, std::nan(""), {1}}).error().message,
+              "the range of the heights must be above 0");
+}
+
+}  // namespace
+}  // namespace vcp::meso
