@@ -43,7 +43,8 @@ list(JOIN links ", " links)
 set(library libvcp${PROJECT_VERSION_MAJOR})
 set(same_library "${library} (= ${PROJECT_VERSION})")
 if(TARGET vcp_widget)
-    vcp_debian(library ${library} libs "Viewer of massive scans: the library\n A widget that shows .vcp files, for programs in C, C++ and Python.")
+    vcp_debian(library ${library} libs "Viewer of massive scans: the library\n A widget that shows .vcp files, for programs in C, C++ and Python."
+        RECOMMENDS libvulkan1)
     # The binary interface only grows: a program needs the library that it was built with, or a later one.
     file(WRITE ${PROJECT_BINARY_DIR}/debian/shlibs "libvcp ${PROJECT_VERSION_MAJOR} ${library} (>= ${PROJECT_VERSION})\n")
     set(CPACK_DEBIAN_LIBRARY_PACKAGE_CONTROL_EXTRA ${PROJECT_BINARY_DIR}/debian/shlibs)
@@ -55,7 +56,7 @@ else()
 endif()
 if(TARGET vcp)
     vcp_debian(tools vcp graphics "Viewer of massive scans\n Builds triangle meshes of any size into one file that can be looked at at once, and shows it."
-        RECOMMENDS "mesa-vulkan-drivers | vulkan-icd")
+        RECOMMENDS "libvulkan1, mesa-vulkan-drivers | vulkan-icd")
 endif()
 if(TARGET vcp_python)
     set(minor ${Python3_VERSION_MINOR})

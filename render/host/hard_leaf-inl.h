@@ -21,6 +21,8 @@ struct GroupInHardLeaf {
     Lane3 normal;
     Mask inside, hit;
     LaneWords triangle;  // what HitLeaf numbers
+
+    HWY_ATTR GroupInHardLeaf() {}  // as RayGroup's
 };
 
 template <bool kIsCut>

@@ -23,6 +23,9 @@ struct RayGroup {
     Lane t, x, y, z, side;
     Lane3 normal;
     LaneWords leaf;
+
+    // Compilers for Arm give an implicit constructor no instruction set.
+    HWY_ATTR RayGroup() {}
 };
 
 /// unfoldOctahedron of leaf_math.h, times `length`.
@@ -84,6 +87,8 @@ struct GroupSegment {
     KeptSpan kept;     // its end is set where planes cut the leaf
     Lane first, last;  // what is inside of the leaf, from kept.begin on
     Mask inside;       // rays of which there is such a part
+
+    HWY_ATTR GroupSegment() {}
 };
 
 /// Returns what section planes leave of a segment.

@@ -115,7 +115,9 @@ Result<WordBuffer> FrameResources::wordBuffer(uint64_t words, VkBufferUsageFlags
                        words * 4, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT | more,
                        MemoryUse::Local));
     made.buffer = std::move(buffer);
-    VCP_TRY_ASSIGN(made.view, device_.createTexelView(made.buffer, format, words * 4));
+    // A device of shorter texel buffers reads the storage buffer.
+    const uint64_t viewed = std::min<uint64_t>(words, device_.limits().maxTexelBufferElements);
+    VCP_TRY_ASSIGN(made.view, device_.createTexelView(made.buffer, format, viewed * 4));
     return made;
 }
 

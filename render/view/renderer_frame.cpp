@@ -68,13 +68,13 @@ Result<void> Renderer::View::checkLimits(const Layer& layer, const FrameRequest&
                            hitPlanes(request, layer.residency != nullptr && layer.residency->hasColour());
     const Device& device = *shared->device;
     const VkPhysicalDeviceLimits& limits = device.limits();
-    if (words * 4 <= limits.maxStorageBufferRange && words <= limits.maxTexelBufferElements) return {};
-    return Error{
-        .code = ErrorCode::Limit,
-        .message = fmt::format("{} x {} pixels are more than '{}' can address at once; at most {} pixels",
-                               request.width, request.height, device.info().name,
-                               std::min<uint64_t>(limits.maxStorageBufferRange / 4, limits.maxTexelBufferElements) /
-                                   (words / (uint64_t{request.width} * request.height)))};
+    uint64_t most = limits.maxStorageBufferRange / 4;
+    if (shared->access == PageAccess::TexelBuffer) most = std::min<uint64_t>(most, limits.maxTexelBufferElements);
+    if (words <= most) return {};
+    return Error{.code = ErrorCode::Limit,
+                 .message = fmt::format("{} x {} pixels are more than '{}' can address at once; at most {} pixels",
+                                        request.width, request.height, device.info().name,
+                                        most / (words / (uint64_t{request.width} * request.height)))};
 }
 
 void Renderer::View::refreshTable(Layer& layer) const {

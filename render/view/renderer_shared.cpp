@@ -9,11 +9,19 @@
 
 namespace vcp {
 
+namespace {
+
+// Elements of a texel buffer that hold a picture of 4096 x 4096, or a chunk of the pool of 256 MiB.
+constexpr uint32_t kLongTexelBuffer = 1u << 24;
+
+}  // namespace
+
 void Renderer::Shared::take(std::unique_ptr<Device> made) {
     device = std::move(made);
     info = device->info();
+    const bool longTexels = device->limits().maxTexelBufferElements >= kLongTexelBuffer;
     access = options.access != PageAccess::Auto ? options.access
-             : info.software                    ? PageAccess::TexelBuffer
+             : info.software && longTexels      ? PageAccess::TexelBuffer
                                                 : PageAccess::StorageBuffer;
     stripes = info.software ? std::max(1u, uint32_t(get_nprocs())) : 1;
 }

@@ -58,7 +58,7 @@ struct DeviceFaults {
     uint64_t lostAtSubmission = 0;      ///< the device is lost at this submission of work, once; 0: never
 };
 
-/// How shaders read pages: Auto takes texel buffers on software devices, storage buffers elsewhere.
+/// How shaders read pages: Auto takes texel buffers on software devices that have long ones, storage buffers elsewhere.
 enum class PageAccess { Auto, TexelBuffer, StorageBuffer };
 
 }  // namespace vcp

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "render/vulkan/check.h"
+#include "render/vulkan/library.h"
 
 namespace vcp {
 
@@ -93,6 +94,7 @@ std::vector<std::string> ValidationLog::messages() const {
 }
 
 Result<std::unique_ptr<Instance>> Instance::create(bool validation, const std::vector<std::string>& extensions) {
+    VCP_TRY(openVulkanLibrary());
     std::unique_ptr<Instance> made(new Instance);
     std::vector<const char*> names;
     for (const std::string& name : extensions) names.push_back(name.c_str());

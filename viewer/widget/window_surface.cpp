@@ -4,6 +4,7 @@
 #include <cstring>
 
 #include "render/vulkan/check.h"
+#include "render/vulkan/library.h"
 
 // These declarations are what three headers of Vulkan need of the window systems' own, which need not be installed.
 struct xcb_connection_t;
@@ -66,6 +67,7 @@ VkResult createByHost(const vcp_view_options& options, VkInstance instance, VkSu
 }  // namespace
 
 Result<std::vector<std::string>> windowExtensions() {
+    VCP_TRY(openVulkanLibrary());
     uint32_t count = 0;
     VCP_VK(vkEnumerateInstanceExtensionProperties, nullptr, &count, nullptr);
     std::vector<VkExtensionProperties> there(count);

@@ -10,6 +10,7 @@
 #include <GLFW/glfw3.h>
 #include <imgui.h>
 
+#include "render/vulkan/library.h"
 #include "viewer/key_map.h"
 #include "viewer/window/interface.h"
 #include "viewer/window/interface_painter.h"
@@ -43,6 +44,7 @@ public:
     Result<void> open(glm::ivec2 size, const std::string& title) {
         if (!glfwInit()) return displayError("no display to open a window on");
         started_ = true;
+        VCP_TRY(openVulkanLibrary());
         if (!glfwVulkanSupported()) return displayError("Vulkan cannot draw into windows here");
         glfwWindowHint(GLFW_CLIENT_API, GLFW_NO_API);
         glfwWindowHint(GLFW_SCALE_TO_MONITOR, GLFW_TRUE);
