@@ -207,6 +207,23 @@ struct DealVisit {
     Result<void> finish() { return batch.flush(); }
 };
 
+/// Deals where there is one bin: nothing is sorted.
+struct OneBinVisit {
+    RecordBins<LatticeTriangle>& bins;
+    std::vector<LatticeTriangle> held;
+
+    Result<void> operator()(const LatticeTriangle& t) {
+        constexpr size_t kMostHeld = 4096;
+        held.push_back(t);
+        return held.size() < kMostHeld ? Result<void>() : finish();
+    }
+    Result<void> finish() {
+        VCP_TRY(bins.append(0, held));
+        held.clear();
+        return {};
+    }
+};
+
 /// Returns by how many levels the base level is too fine for pages that hold triangles of their own (deal.h). `pages`:
 /// those of the base level.
 uint32_t levelsTooMany(const PageCounts& pages, uint64_t triangles) {
@@ -252,9 +269,13 @@ Result<PageChoice> choosePages(const PageChoosing& choosing) {
 }
 
 Result<void> dealTriangles(const Dealing& dealing, const PagePartition& partition, RecordBins<LatticeTriangle>& bins) {
-    VCP_TRY(forLatticeTriangles(dealing.soup, dealing.snapper, true, dealing.progress, [&] {
-        return DealVisit{dealing.grid, partition, BinBatch(bins)};
-    }));
+    const auto deal = [&](auto&& makeVisit) {
+        return forLatticeTriangles(dealing.soup, dealing.snapper, true, dealing.progress, makeVisit);
+    };
+    if (partition.bins() == 1)
+        VCP_TRY(deal([&] { return OneBinVisit{bins, {}}; }));
+    else
+        VCP_TRY(deal([&] { return DealVisit{dealing.grid, partition, BinBatch(bins)}; }));
     return bins.raw().flush();
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <bit>
 #include <span>
 #include <tuple>
 
@@ -50,12 +51,21 @@ void removeCovered(std::span<const LatticeTriangle> triangles, std::vector<Segme
     for (const Segment& s : segments) wanted.push_back(s.ends());
     std::sort(wanted.begin(), wanted.end());
     wanted.erase(std::unique(wanted.begin(), wanted.end()), wanted.end());
+    if (wanted.empty()) return;
+    // Few points begin a segment, and of the others most are known by one bit.
+    std::vector<bool> begins(std::bit_ceil(64 * wanted.size()));
+    const auto placeOf = [&](const Point& p) {
+        const glm::u32vec3 v(vectorOf(p));
+        return (v.x * 0x9e3779b1u ^ v.y * 0x85ebca6bu ^ v.z * 0xc2b2ae35u) & (begins.size() - 1);
+    };
+    for (const auto& [p, q] : wanted) begins[placeOf(p)] = true;
     std::vector<std::atomic<bool>> covered(wanted.size());
     tbb::parallel_for(tbb::blocked_range<size_t>(0, triangles.size(), 16384), [&](const auto& range) {
         for (size_t k = range.begin(); k < range.end(); ++k)
             for (int i = 0; i < 3; ++i) {
                 const Point p = pointOf(triangles[k].corner[i]), q = pointOf(triangles[k].corner[(i + 1) % 3]);
                 for (const auto& ends : {std::pair(std::min(p, q), std::max(p, q)), std::pair(p, p)}) {
+                    if (!begins[placeOf(ends.first)]) continue;
                     const auto at = std::lower_bound(wanted.begin(), wanted.end(), ends);
                     if (at != wanted.end() && *at == ends) covered[size_t(at - wanted.begin())] = true;
                 }

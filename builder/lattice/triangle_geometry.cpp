@@ -152,13 +152,20 @@ std::pair<double, double> extentOf(const Polygon& polygon, int axis) {
 }
 
 PolygonSides partAt(const Polygon& polygon, int axis, double at, Polygon& below, Polygon& above) {
-    const auto [least, most] = extentOf(polygon, axis);
-    if (most <= at || least >= at) return {most <= at ? &polygon : nullptr, least >= at ? &polygon : nullptr};
+    std::array<double, Polygon::kMaxCorners> from;  // the plane, of each corner
+    bool isBelow = false, isAbove = false;
+    for (size_t i = 0; i < polygon.size(); ++i) {
+        from[i] = polygon[i][axis] - at;
+        isBelow |= from[i] < 0;
+        isAbove |= from[i] > 0;
+    }
+    if (!isBelow || !isAbove) return {isAbove ? nullptr : &polygon, isBelow ? nullptr : &polygon};
     below.clear();
     above.clear();
     for (size_t i = 0; i < polygon.size(); ++i) {
-        const glm::dvec3 &a = polygon[i], &b = polygon[i + 1 < polygon.size() ? i + 1 : 0];
-        const double da = a[axis] - at, db = b[axis] - at;
+        const size_t next = i + 1 < polygon.size() ? i + 1 : 0;
+        const double da = from[i], db = from[next];
+        const glm::dvec3 &a = polygon[i], &b = polygon[next];
         if (da <= 0) below.add(a);
         if (da >= 0) above.add(a);
         if ((da < 0) == (db < 0) || da == 0 || db == 0) continue;

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <optional>
 #include <vector>
 
 #include <glm/common.hpp>
@@ -87,6 +86,7 @@ private:
 
     void prepare(const std::vector<uint32_t>& list) {
         place_.resize(bounds_.size());
+        tests_.reserve(list.size());
         for (const uint32_t k : list) {
             place_[k] = uint16_t(tests_.size());
             tests_.emplace_back(cornersOf(k));
@@ -114,17 +114,14 @@ private:
         const glm::i32vec3 lower = box.lower * kSubcellSteps;
         for (const uint32_t k : list) {
             const uint32_t octants = octantsTouched(bounds_[k].low, bounds_[k].high, lower + half);
-            if (std::has_single_bit(octants)) {
+            if ((octants & (octants - 1)) == 0) {
                 children[size_t(std::countr_zero(octants))].push_back(k);
                 continue;
             }
-            std::optional<CubeTest> made;
-            CubeTest& test = tests_.empty() ? made.emplace(cornersOf(k)) : tests_[place_[k]];
-            for (uint32_t rest = octants; rest != 0; rest &= rest - 1) {
-                const int o = std::countr_zero(rest);
-                if (test.touches(lower + half * glm::i32vec3(o & 1, o >> 1 & 1, o >> 2), half))
-                    children[size_t(o)].push_back(k);
-            }
+            const uint32_t touched = tests_.empty() ? CubeTest(cornersOf(k)).touchedOctants(lower + half, half, octants)
+                                                    : tests_[place_[k]].touchedOctants(lower + half, half, octants);
+            for (uint32_t rest = touched; rest != 0; rest &= rest - 1)
+                children[size_t(std::countr_zero(rest))].push_back(k);
         }
         return children;
     }

@@ -12,26 +12,15 @@ namespace vcp {
 
 namespace {
 
-/// Returns the largest of dot(n, x) in a box.
-double supportOfBox(const CellSurface& cell, glm::dvec3 n) {
-    double sum = 0;
-    for (int i = 0; i < 3; ++i) sum += std::max(n[i] * double(cell.lower[i]), n[i] * double(cell.upper[i]));
-    return sum;
-}
-
-/// Returns the largest of dot(n, x) where the box and the slab meet. For every m, the sum of the box's support along
-/// n - m axis and of the slab's along m axis is a bound; the least of them, which is the maximum itself (duality of
-/// linear programs), is at m = 0 or where an entry of n - m axis is 0.
-double support(const CellSurface& cell, glm::dvec3 n) {
-    const glm::dvec3 axis(cell.axis);
-    double least = supportOfBox(cell, n);
+/// Returns bounds of dot(n, x) in a box.
+Extent extentInBox(const glm::dvec3& lower, const glm::dvec3& upper, const glm::dvec3& n) {
+    Extent sum{0, 0};
     for (int i = 0; i < 3; ++i) {
-        if (axis[i] == 0) continue;
-        const double m = n[i] / axis[i];
-        const double along = m * double(m > 0 ? cell.last : cell.first);
-        least = std::min(least, supportOfBox(cell, n - m * axis) + along);
+        const double a = n[i] * lower[i], b = n[i] * upper[i];
+        sum.first += std::min(a, b);
+        sum.last += std::max(a, b);
     }
-    return least;
+    return sum;
 }
 
 glm::dmat3 matrixOf(const std::array<float, 6>& m) {
@@ -42,7 +31,21 @@ glm::dmat3 matrixOf(const std::array<float, 6>& m) {
 
 }  // namespace
 
-Extent extentAlong(const CellSurface& cell, glm::dvec3 n) { return {-support(cell, -n), support(cell, n)}; }
+// For every m, the sum of the box's extent along n - m axis and of the slab's along m axis is a bound; the least of
+// them, which is the extent itself (duality of linear programs), is at m = 0 or where an entry of n - m axis is 0.
+Extent extentAlong(const CellSurface& cell, glm::dvec3 n) {
+    const glm::dvec3 axis(cell.axis), lower(cell.lower), upper(cell.upper);
+    Extent least = extentInBox(lower, upper, n);
+    for (int i = 0; i < 3; ++i) {
+        if (axis[i] == 0 || n[i] == 0) continue;
+        const double m = n[i] / axis[i];
+        const Extent box = extentInBox(lower, upper, n - m * axis);
+        const double first = m * double(cell.first), last = m * double(cell.last);
+        least.first = std::max(least.first, box.first + (m > 0 ? first : last));
+        least.last = std::min(least.last, box.last + (m > 0 ? last : first));
+    }
+    return least;
+}
 
 Extent extentAlong(std::span<const CellSurface> eighths, std::span<const uint32_t> octants, glm::dvec3 n) {
     Extent all{std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};

@@ -45,9 +45,9 @@ public:
                     const size_t i = indexOf({x, y, z});
                     if (!isFull_[i]) continue;
                     const glm::dvec3 apart = glm::max(points.upper - box_[i].lower, box_[i].upper - points.lower);
-                    least = std::min(least, glm::length(apart));
+                    least = std::min(least, glm::dot(apart, apart));
                 }
-        return least;
+        return std::sqrt(least);
     }
 
 private:

@@ -49,6 +49,13 @@ glm::dvec3 TriangleCutter::Source::weightsAt(glm::dvec3 p) const {
     return {1 - b - c, b, c};
 }
 
+glm::vec4 TriangleCutter::colourAt(glm::dvec3 weights) const {
+    // White is white, but for what rounding makes of the weights.
+    if (mesh_.colours.empty()) return glm::vec4(float(weights.x + weights.y + weights.z));
+    const auto& colour = source_.colour;
+    return glm::vec4(weights.x * colour[0] + weights.y * colour[1] + weights.z * colour[2]);
+}
+
 TriangleCutter::Source TriangleCutter::sourceOf(uint32_t triangle) const {
     const auto& t = mesh_.triangles[triangle];
     Source source;
@@ -60,11 +67,10 @@ TriangleCutter::Source TriangleCutter::sourceOf(uint32_t triangle) const {
     source.secondGrows = glm::cross(c - a, cross) / squared;
     source.thirdGrows = glm::cross(cross, b - a) / squared;
     const glm::dvec3 flat = cross / std::sqrt(squared);
-    for (size_t i = 0; i < 3; ++i) {
-        source.normal[i] = f64::cornerNormal(mesh_.normals[t[i]], flat);
-        const uint32_t rgba = mesh_.colours.empty() ? 0xffffffffu : mesh_.colours[t[i]];
-        for (int k = 0; k < 4; ++k) source.colour[i][k] = double(rgba >> 8 * k & 255u) / 255;
-    }
+    for (size_t i = 0; i < 3; ++i) source.normal[i] = f64::cornerNormal(mesh_.normals[t[i]], flat);
+    if (mesh_.colours.empty()) return source;
+    for (size_t i = 0; i < 3; ++i)
+        for (int k = 0; k < 4; ++k) source.colour[i][k] = double(mesh_.colours[t[i]] >> 8 * k & 255u) / 255;
     return source;
 }
 
@@ -87,30 +93,20 @@ void TriangleCutter::cut(uint32_t triangle) {
     if (!piece.empty()) split(piece, {glm::ivec3(0), depth_});
 }
 
-TriangleCutter::OctreeBox TriangleCutter::boxAround(const Polygon& piece, const CutterBox& whole) {
-    glm::dvec3 least = piece[0], most = piece[0];
-    for (const glm::dvec3& p : piece) {
-        least = glm::min(least, p);
-        most = glm::max(most, p);
-    }
-    glm::ivec3 first, last;
-    int differ = 0;
+TriangleCutter::CellRange TriangleCutter::cellsOf(const Polygon& piece, const CutterBox& whole) {
+    CellRange cells;
     for (int axis = 0; axis < 3; ++axis) {
         // A piece that only reaches a wall is in the cell that it comes from; one in a wall is on both sides of it.
         // No coordinate is negative, so conversion rounds down.
-        const int begin = int(least[axis]), end = int(most[axis]);
-        const bool endsInWall = double(end) == most[axis], isInWall = endsInWall && least[axis] == most[axis];
+        const auto [least, most] = extentOf(piece, axis);
+        const int begin = int(least), end = int(most);
+        const bool endsInWall = double(end) == most, isInWall = endsInWall && least == most;
+        cells.endInWall |= endsInWall || double(begin) == least;
         const int lower = whole.lower[axis], upper = lower + (1 << whole.log2Edge) - 1;
-        first[axis] = std::clamp(begin - (isInWall ? 1 : 0), lower, upper);
-        last[axis] = std::clamp(end - (endsInWall && !isInWall ? 1 : 0), lower, upper);
-        differ |= first[axis] ^ last[axis];
+        cells.first[axis] = std::clamp(begin - (isInWall ? 1 : 0), lower, upper);
+        cells.last[axis] = std::clamp(end - (endsInWall && !isInWall ? 1 : 0), lower, upper);
     }
-    const int bits = int(std::bit_width(unsigned(differ)));
-    OctreeBox box{{first >> bits << bits, bits}, {}};
-    if (bits > 0)
-        for (int axis = 0; axis < 3; ++axis)
-            box.halves[size_t(axis)] = 1u << (first[axis] >> (bits - 1) & 1) | 1u << (last[axis] >> (bits - 1) & 1);
-    return box;
+    return cells;
 }
 
 bool TriangleCutter::isWanted(const CutterBox& box) const {
@@ -119,15 +115,17 @@ bool TriangleCutter::isWanted(const CutterBox& box) const {
 }
 
 void TriangleCutter::split(const Polygon& piece, const CutterBox& whole) {
-    const OctreeBox box = boxAround(piece, whole);
+    const CellRange cells = cellsOf(piece, whole);
+    const CutterBox box = cells.box();
     if (!isWanted(box)) return;
-    if (box.log2Edge == 0) return keep(piece, box.lower);
+    // Rounding may carry what is cut across a wall that the piece ended in: then it is cut there as well, box by box.
+    if (cells.walls() == 0 || (cells.walls() <= kMostWalls && !cells.endInWall)) return cutAtWalls(piece, cells);
     const glm::dvec3 middle(box.child(7).lower);
     Polygon room[3][2];
     const auto sidesOf = [&](const Polygon& part, int axis) -> PolygonSides {
-        const uint32_t halves = box.halves[size_t(axis)];
-        if (halves == 3) return partAt(part, axis, middle[axis], room[axis][0], room[axis][1]);
-        return {halves == 1 ? &part : nullptr, halves == 2 ? &part : nullptr};
+        const int bit = box.log2Edge - 1, first = cells.first[axis] >> bit & 1, last = cells.last[axis] >> bit & 1;
+        if (first != last) return partAt(part, axis, middle[axis], room[axis][0], room[axis][1]);
+        return {first == 0 ? &part : nullptr, first == 1 ? &part : nullptr};
     };
     const auto splitOctant = [&](const Polygon* part, int octant) {
         if (part != nullptr) split(*part, box.child(octant));
@@ -147,6 +145,45 @@ void TriangleCutter::split(const Polygon& piece, const CutterBox& whole) {
     }
 }
 
+void TriangleCutter::cutAtWalls(const Polygon& piece, const CellRange& cells) {
+    struct Wall {
+        int axis, at, order;
+    };
+    // In the octree's order, which rounding depends on: those of large boxes first.
+    std::array<Wall, kMostWalls> walls;
+    int count = 0;
+    for (int axis = 0; axis < 3; ++axis)
+        for (int at = cells.first[axis] + 1; at <= cells.last[axis]; ++at) {
+            const Wall wall{axis, at, axis - 3 * std::countr_zero(unsigned(at))};
+            int place = count++;
+            for (; place > 0 && walls[size_t(place) - 1].order > wall.order; --place)
+                walls[size_t(place)] = walls[size_t(place) - 1];
+            walls[size_t(place)] = wall;
+        }
+    struct Part {
+        const Polygon* polygon;
+        glm::ivec3 cell;  ///< the last one that it can be in
+    };
+    std::array<Part, kMostParts> parts;
+    parts[0] = {&piece, cells.last};
+    size_t made = 1, taken = 0;
+    for (int w = 0; w < count; ++w) {
+        const auto [axis, at, order] = walls[size_t(w)];
+        for (size_t i = 0, end = made; i < end; ++i) {
+            if (parts[i].cell[axis] < at) continue;
+            const PolygonSides sides = partAt(*parts[i].polygon, axis, at, room_[taken], room_[taken + 1]);
+            if (sides.below == &room_[taken]) taken += 2;
+            if (sides.below == nullptr) continue;
+            Part& below = sides.above == nullptr ? parts[i] : parts[made++];
+            below = {sides.below, parts[i].cell};
+            below.cell[axis] = at - 1;
+            if (sides.above != nullptr) parts[i].polygon = sides.above;
+        }
+    }
+    for (size_t i = 0; i < made; ++i)
+        if (isWanted({parts[i].cell, 0})) keep(*parts[i].polygon, parts[i].cell);
+}
+
 void TriangleCutter::keep(const Polygon& piece, glm::ivec3 cell) {
     const double size = glm::length(areaVector(piece));
     if (size == 0) return;
@@ -154,21 +191,25 @@ void TriangleCutter::keep(const Polygon& piece, glm::ivec3 cell) {
     for (const glm::dvec3& p : piece) middle += p;
     const glm::dvec3 w = source_.weightsAt(middle / double(piece.size()));
     const auto& n = source_.normal;
-    const auto& colour = source_.colour;
     const glm::dvec3 normal = w.x * n[0] + w.y * n[1] + w.z * n[2];
     const double length = glm::length(normal);
-    pieces_.push_back({uint32_t(mortonEncode(glm::u32vec3(cell))), uint32_t(corners_.size()), uint32_t(piece.size()),
-                       float(size / 2), glm::vec3(length > 0 ? normal / length : n[0]),
-                       glm::vec4(w.x * colour[0] + w.y * colour[1] + w.z * colour[2])});
+    CellPiece& kept = pieces_.emplace_back();
+    kept.code = uint32_t(mortonEncode(glm::u32vec3(cell)));
+    kept.first = uint32_t(corners_.size());
+    kept.count = uint32_t(piece.size());
+    kept.area = float(size / 2);
+    kept.normal = glm::vec3(length > 0 ? normal / length : n[0]);
+    kept.colour = colourAt(w);
     const glm::dvec3 centre = glm::dvec3(cell) + 0.5;
     for (const glm::dvec3& p : piece) corners_.emplace_back(p - centre);
 }
 
-CellSurface TriangleCutter::sum(std::span<const CellPiece> pieces) const {
+CellSurface TriangleCutter::sum(std::span<const uint64_t> pieces) const {
     CellSurface cell;
     cell.lower = glm::vec3(1);
     cell.upper = glm::vec3(-1);
-    for (const CellPiece& piece : pieces) {
+    for (const uint64_t number : pieces) {
+        const CellPiece& piece = pieces_[uint32_t(number)];
         const glm::vec3 n = piece.normal;
         const float products[6] = {n.x * n.x, n.y * n.y, n.z * n.z, n.y * n.z, n.z * n.x, n.x * n.y};
         for (size_t k = 0; k < 6; ++k) cell.moment[k] += piece.area * products[k];
@@ -177,14 +218,18 @@ CellSurface TriangleCutter::sum(std::span<const CellPiece> pieces) const {
     }
     chooseAxis(cell);
     double first = 2, last = -2;
-    for (const CellPiece& piece : pieces)
+    for (const uint64_t number : pieces) {
+        const CellPiece& piece = pieces_[uint32_t(number)];
         for (const glm::vec3& x : std::span(corners_).subspan(piece.first, piece.count)) {
-            cell.lower = glm::min(cell.lower, x - kRounding);
-            cell.upper = glm::max(cell.upper, x + kRounding);
+            cell.lower = glm::min(cell.lower, x);
+            cell.upper = glm::max(cell.upper, x);
             const double along = glm::dot(glm::dvec3(cell.axis), glm::dvec3(x));
             first = std::min(first, along);
             last = std::max(last, along);
         }
+    }
+    cell.lower -= kRounding;
+    cell.upper += kRounding;
     cell.first = float(first) - 2 * kRounding;
     cell.last = float(last) + 2 * kRounding;
     return cell;
@@ -195,13 +240,13 @@ void TriangleCutter::appendTo(SurfaceCells& cells) const {
     std::vector<uint64_t> order(pieces_.size());
     for (size_t i = 0; i < order.size(); ++i) order[i] = uint64_t{pieces_[i].code} << 32 | i;
     sortHighHalves(order, 3 * depth_);
-    std::vector<CellPiece> inCell;
     for (size_t i = 0; i < order.size();) {
         const uint32_t code = uint32_t(order[i] >> 32);
-        inCell.clear();
-        for (; i < order.size() && uint32_t(order[i] >> 32) == code; ++i) inCell.push_back(pieces_[uint32_t(order[i])]);
+        size_t end = i;
+        while (end < order.size() && uint32_t(order[end] >> 32) == code) ++end;
         cells.codes.push_back(code);
-        cells.cells.push_back(sum(inCell));
+        cells.cells.push_back(sum(std::span(order).subspan(i, end - i)));
+        i = end;
     }
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <bit>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -42,13 +43,23 @@ private:
         Triangle3 corners;
         glm::dvec3 secondGrows{0}, thirdGrows{0};  ///< gradients of these corners' weights
         std::array<glm::dvec3, 3> normal;
-        std::array<glm::dvec4, 3> colour;
+        std::array<glm::dvec4, 3> colour;  ///< where the mesh has colours
         /// Returns the weights of the corners at a point of the triangle.
         [[nodiscard]] glm::dvec3 weightsAt(glm::dvec3 p) const;
     };
-    /// A box, and the halves of it along each axis that a piece is in: 1, 2 or both.
-    struct OctreeBox : CutterBox {
-        std::array<uint32_t, 3> halves;
+    /// The cells that a piece is in along each axis.
+    struct CellRange {
+        glm::ivec3 first{0}, last{0};
+        bool endInWall = false;  ///< whether the piece reaches a wall, or is in one
+
+        /// Returns the smallest box of the octree around them.
+        [[nodiscard]] CutterBox box() const {
+            const glm::ivec3 differ = first ^ last;
+            const int bits = int(std::bit_width(unsigned(differ.x | differ.y | differ.z)));
+            return {first >> bits << bits, bits};
+        }
+        /// Returns how many walls are between them.
+        [[nodiscard]] int walls() const { return last.x - first.x + last.y - first.y + last.z - first.z; }
     };
     /// A piece that lies in one cell.
     struct CellPiece {
@@ -60,20 +71,29 @@ private:
     /// Whether a triangle's bounds reach the box.
     [[nodiscard]] bool mayReach(uint32_t triangle) const;
     [[nodiscard]] Source sourceOf(uint32_t triangle) const;
-    /// Returns the smallest box around the part of a piece that is in a box.
-    [[nodiscard]] static OctreeBox boxAround(const Polygon& piece, const CutterBox& whole);
+    /// Returns the cells of a box that a piece is in.
+    [[nodiscard]] static CellRange cellsOf(const Polygon& piece, const CutterBox& whole);
     /// Cuts what is in a box into pieces that lie in one cell each.
     void split(const Polygon& piece, const CutterBox& whole);
+    /// Cuts a piece that is in few cells, wall by wall.
+    void cutAtWalls(const Polygon& piece, const CellRange& cells);
     /// Whether a box and the one that pieces are kept of have cells in common.
     [[nodiscard]] bool isWanted(const CutterBox& box) const;
     void keep(const Polygon& piece, glm::ivec3 cell);
-    [[nodiscard]] CellSurface sum(std::span<const CellPiece> pieces) const;
+    /// Returns the colour at a point of the triangle that is being cut.
+    [[nodiscard]] glm::vec4 colourAt(glm::dvec3 weights) const;
+    /// `pieces`: their numbers in the low halves of words.
+    [[nodiscard]] CellSurface sum(std::span<const uint64_t> pieces) const;
+
+    static constexpr int kMostWalls = 6;
+    static constexpr size_t kMostParts = 27;  // with two walls along each axis
 
     const LatticeMesh& mesh_;
     glm::i32vec3 origin_;
     int depth_;
     CutterBox within_;
     Source source_;
+    std::array<Polygon, 2 * kMostParts> room_;  ///< for the parts of a piece
     std::vector<CellPiece> pieces_;
     std::vector<glm::vec3> corners_;  ///< from the centres of the pieces' cells
 };

@@ -1,5 +1,7 @@
 #include "octree/surface/leaf_triangles.h"
 
+#include <glm/common.hpp>
+
 namespace vcp {
 
 namespace {
@@ -49,12 +51,51 @@ bool CubeTest::touches(glm::i32vec3 lower, int edge) {
     const int64_t plane = 2 * offset_ - (normal_.x * cx + normal_.y * cy + normal_.z * cz);
     if ((plane < 0 ? -plane : plane) > edge * normalSize_) return false;
     const double x = double(cx), y = double(cy), z = double(cz), half = edge;
-    int apart = 0;
+    // The cube is apart where any of the differences is negative: its sign says so without a branch. Half a step of
+    // room, so that none is zero: zeros have either sign.
+    int64_t apart = 0;
     for (int n = 0; n < kAxes; ++n) {
-        const double centre = along_[0][n] * x + along_[1][n] * y + along_[2][n] * z, reach = half * size_[n];
-        apart |= (least_[n] - centre > reach) | (most_[n] - centre < -reach);
+        const double centre = along_[0][n] * x + along_[1][n] * y + along_[2][n] * z, reach = half * size_[n] + 0.5;
+        apart |= std::bit_cast<int64_t>(centre + reach - least_[n]) | std::bit_cast<int64_t>(most_[n] + reach - centre);
     }
-    return apart == 0;
+    return apart >= 0;
+}
+
+uint32_t CubeTest::touchedOctants(glm::i32vec3 middle, int half, uint32_t among) {
+    uint32_t touched = 0;
+    for (const glm::i32vec3& p : corners_) {
+        const glm::i32vec3 d = glm::abs(p - middle);
+        touched |= uint32_t{std::max(d.x, std::max(d.y, d.z)) <= half} * octantsTouched(p, p, middle);
+    }
+    uint32_t rest = among & ~touched;
+    if (rest == 0) return touched;
+    if (!prepared_) prepare();
+    // As in touches(), of all octants at once: their centres, doubled, are `half` away from twice the middle.
+    const glm::i64vec3 centre = glm::i64vec3(middle) * int64_t{2};
+    const int64_t plane = 2 * offset_ - (normal_.x * centre.x + normal_.y * centre.y + normal_.z * centre.z);
+    const glm::i64vec3 ways = int64_t{half} * normal_;
+    const double x = double(centre.x), y = double(centre.y), z = double(centre.z), h = half;
+    double least[kAxes], most[kAxes], away[3][kAxes];
+    for (int n = 0; n < kAxes; ++n) {
+        const double at = along_[0][n] * x + along_[1][n] * y + along_[2][n] * z, reach = h * size_[n] + 0.5;
+        least[n] = least_[n] - at - reach;
+        most[n] = most_[n] - at + reach;
+        for (int axis = 0; axis < 3; ++axis) away[axis][n] = h * along_[axis][n];
+    }
+    for (; rest != 0; rest &= rest - 1) {
+        const int o = std::countr_zero(rest);
+        const int64_t sx = o & 1 ? 1 : -1, sy = o & 2 ? 1 : -1, sz = o & 4 ? 1 : -1;
+        const int64_t above = plane - (sx * ways.x + sy * ways.y + sz * ways.z);
+        if ((above < 0 ? -above : above) > half * normalSize_) continue;
+        const double dx = double(sx), dy = double(sy), dz = double(sz);
+        int64_t apart = 0;
+        for (int n = 0; n < kAxes; ++n) {
+            const double to = dx * away[0][n] + dy * away[1][n] + dz * away[2][n];
+            apart |= std::bit_cast<int64_t>(to - least[n]) | std::bit_cast<int64_t>(most[n] - to);
+        }
+        if (apart >= 0) touched |= 1u << o;
+    }
+    return touched;
 }
 
 NodePlaces::NodePlaces(uint32_t root, std::span<const uint32_t> nodes, uint32_t log2Cells)

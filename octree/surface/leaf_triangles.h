@@ -19,12 +19,24 @@ namespace vcp {
 /// 2^kCellShift steps of the lattice are a cell.
 inline constexpr int kCellShift = std::countr_zero(unsigned(kLatticePerCell));
 
+/// Returns the octants of a cube that closed bounds touch, as bits: octant x + 2 y + 4 z. `middle`: the cube's.
+inline uint32_t octantsTouched(glm::i32vec3 low, glm::i32vec3 high, glm::i32vec3 middle) {
+    // Products, since none of these can be foretold: branches would be slow.
+    const uint32_t x = uint32_t{low.x <= middle.x} * 0x55u | uint32_t{high.x >= middle.x} * 0xaau;
+    const uint32_t y = uint32_t{low.y <= middle.y} * 0x33u | uint32_t{high.y >= middle.y} * 0xccu;
+    const uint32_t z = uint32_t{low.z <= middle.z} * 0x0fu | uint32_t{high.z >= middle.z} * 0xf0u;
+    return x & y & z;
+}
+
 /// Exact overlap of a closed triangle with closed cubes whose bounding boxes overlap its own: the separating axis
 /// test (Akenine-Moller 2001).
 class CubeTest {
 public:
     explicit CubeTest(const std::array<glm::i32vec3, 3>& triangle) : corners_(triangle) {}
     [[nodiscard]] bool touches(glm::i32vec3 lower, int edge);
+    /// Returns which of some octants of a cube the triangle touches, as bits. `half`: an octant's edge. `among`: those
+    /// that the triangle's bounds touch.
+    [[nodiscard]] uint32_t touchedOctants(glm::i32vec3 middle, int half, uint32_t among);
 
 private:
     void prepare();
@@ -37,14 +49,6 @@ private:
     // Products with the nine axes e x (x, y, z), doubled: all values are integers below 2^53, so doubles are exact.
     double along_[3][kAxes], least_[kAxes], most_[kAxes], size_[kAxes];
 };
-
-/// Returns the octants of a cube that closed bounds touch, as bits: octant x + 2 y + 4 z. `middle`: the cube's.
-inline uint32_t octantsTouched(glm::i32vec3 low, glm::i32vec3 high, glm::i32vec3 middle) {
-    const uint32_t x = (low.x <= middle.x ? 0x55u : 0u) | (high.x >= middle.x ? 0xaau : 0u);
-    const uint32_t y = (low.y <= middle.y ? 0x33u : 0u) | (high.y >= middle.y ? 0xccu : 0u);
-    const uint32_t z = (low.z <= middle.z ? 0x0fu : 0u) | (high.z >= middle.z ? 0xf0u : 0u);
-    return x & y & z;
-}
 
 /// Longest edge of a triangle in a page, along an axis: 256 cells. The limit keeps products within 64 bits.
 inline constexpr int kMaxEdgeSteps = 256 * kLatticePerCell;

@@ -63,6 +63,34 @@ TEST(CubeTest, AgreesWithClipping) {
     EXPECT_GT(apart, 5000u);
 }
 
+TEST(CubeTest, OctantsAreTouchedAsCubesAre) {
+    std::mt19937 random(5);
+    size_t touched = 0, apart = 0;
+    for (int i = 0; i < 60000; ++i) {
+        SCOPED_TRACE(i);
+        const int half = 1 << (i % 12), reach = half << (i % 3);
+        const auto any = [&] { return int(random() % unsigned(2 * reach + 1)) - reach; };
+        const glm::i32vec3 middle(any(), any(), any()), offset(any(), any(), any());
+        std::array<glm::i32vec3, 3> t;
+        for (glm::i32vec3& p : t) p = middle + offset / 2 + glm::i32vec3(any(), any(), any());
+        const glm::i32vec3 low = glm::min(t[0], glm::min(t[1], t[2])), high = glm::max(t[0], glm::max(t[1], t[2]));
+        // The bounding boxes must overlap.
+        if (glm::any(glm::greaterThan(low, middle + half)) || glm::any(glm::lessThan(high, middle - half))) continue;
+        const uint32_t among = octantsTouched(low, high, middle);
+        uint32_t expected = 0;
+        for (uint32_t o = 0; o < 8; ++o) {
+            if ((among >> o & 1u) == 0) continue;
+            const glm::i32vec3 upper(o & 1u, o >> 1 & 1u, o >> 2);
+            const bool touches = CubeTest(t).touches(middle + half * (upper - 1), half);
+            if (touches) expected |= 1u << o;
+            ++(touches ? touched : apart);
+        }
+        ASSERT_EQ(CubeTest(t).touchedOctants(middle, half, among), expected);
+    }
+    EXPECT_GT(touched, 5000u);
+    EXPECT_GT(apart, 5000u);
+}
+
 TEST(CubeTest, TouchingCounts) {
     const int e = 256;
     const glm::i32vec3 o(512, 512, 512);
