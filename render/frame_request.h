@@ -42,23 +42,53 @@ constexpr uint32_t kMostOcclusionRays = 64, kUsualOcclusionRays = 8;
 /// Samples a pixel: at most, and of a picture where no number is asked for.
 constexpr uint32_t kMostSamples = 64, kUsualSamples = 16;
 
+/// A light so far away that its rays are parallel.
+struct DirectedLight {
+    bool followsCamera = true;
+    glm::vec3 direction{-0.35f, 0.55f, 0.75f};  ///< towards it: in camera axes (right, up, back) where it follows the
+                                                ///< camera, else in world axes
+    float strength = 1;                         ///< times the usual one, at least 0
+
+    bool operator==(const DirectedLight&) const = default;
+};
+/// A picture has at most so many (kMaxLights in frame_layout.h).
+constexpr size_t kMostLights = 4;
+/// A light is at most so strong.
+constexpr float kStrongestLight = 10;
+
 struct Shading {
     ShadingMode mode = ShadingMode::Lit;
-    bool lightFollowsCamera = true;
-    glm::vec3 lightDirection{-0.35f, 0.55f, 0.75f};  ///< towards the light: in camera axes (right, up, back)
-                                                     ///< where it follows the camera, else in world axes
-    glm::vec3 clay{0.80f, 0.76f, 0.70f};             ///< linear
-    glm::vec3 cap{0.62f, 0.23f, 0.16f};              ///< linear; colour of cut solids
-    bool shadows = false;                            ///< hard shadows: a further ray a pixel
+    /// The first light, as DirectedLight has it.
+    bool lightFollowsCamera = DirectedLight().followsCamera;
+    glm::vec3 lightDirection = DirectedLight().direction;
+    float lightStrength = DirectedLight().strength;
+    std::vector<DirectedLight> moreLights;  ///< beside it: at most kMostLights - 1
+    glm::vec3 clay{0.80f, 0.76f, 0.70f};    ///< linear
+    glm::vec3 cap{0.62f, 0.23f, 0.16f};     ///< linear; colour of cut solids
+    bool shadows = false;                   ///< hard shadows: a further ray a pixel and light
     uint32_t occlusionRays =
         0;  ///< ambient occlusion: so many further rays a pixel, at most kMostOcclusionRays; 0: off
     double occlusionRadius = 0;                    ///< how far they look, world units; 0: a tenth of the box's diagonal
     glm::vec3 backgroundTop{0.10f, 0.12f, 0.15f};  ///< linear
     glm::vec3 backgroundBottom{0.25f, 0.27f, 0.30f};
     bool transparent = false;  ///< background is black with alpha 0
+    float opacity = 1;         ///< part of a pixel's samples in which a dataset is there, 0 to 1 (hit_light.h)
 
     bool operator==(const Shading&) const = default;
 };
+
+/// Returns all lights, and sets them: at least one, at most kMostLights.
+inline std::vector<DirectedLight> lightsOf(const Shading& shading) {
+    std::vector<DirectedLight> lights{{shading.lightFollowsCamera, shading.lightDirection, shading.lightStrength}};
+    lights.insert(lights.end(), shading.moreLights.begin(), shading.moreLights.end());
+    return lights;
+}
+inline void setLights(Shading& shading, const std::vector<DirectedLight>& lights) {
+    shading.lightFollowsCamera = lights.front().followsCamera;
+    shading.lightDirection = lights.front().direction;
+    shading.lightStrength = lights.front().strength;
+    shading.moreLights.assign(lights.begin() + 1, lights.end());
+}
 
 /// Where a picture lies in a larger one: its upper left pixel, and the size of the whole.
 struct PictureTile {
@@ -66,6 +96,15 @@ struct PictureTile {
     uint32_t fullWidth = 1, fullHeight = 1;  ///< 1 to 2^20 each
 
     bool operator==(const PictureTile&) const = default;
+};
+
+/// How one dataset is shown.
+struct DatasetLook {
+    uint32_t dataset = 0;             ///< its number
+    std::optional<glm::vec3> colour;  ///< linear; in place of its own colours and of clay, where there is light
+    float opacity = 1;                ///< 0 to 1; its shadows stay
+
+    bool operator==(const DatasetLook&) const = default;
 };
 
 /// All that a picture depends on, beside the pages. Datasets of the method `paper` (octree/page/paper_page.h) are drawn
@@ -83,10 +122,24 @@ struct FrameRequest {
     bool beam = true;                    ///< beam pass; the picture is the same without it, only slower
     bool countSteps = false;             ///< fills FrameStats::steps and fetches (a slower variant)
     PaperMarch march;                    ///< march through datasets of the method `paper`
+    std::vector<DatasetLook> looks;      ///< of datasets that are shown otherwise than as they are
     std::vector<uint32_t> hidden;        ///< numbers of datasets that are neither drawn nor loaded, in any order
 
     bool operator==(const FrameRequest&) const = default;
 };
+
+/// Returns the request for a dataset as it is to look.
+inline FrameRequest requestOfLook(const FrameRequest& request, size_t dataset) {
+    FrameRequest own = request;
+    for (const DatasetLook& look : request.looks) {
+        if (look.dataset != dataset) continue;
+        own.shading.opacity = look.opacity;
+        if (!look.colour) continue;
+        own.shading.clay = *look.colour;
+        if (own.shading.mode == ShadingMode::Lit) own.shading.mode = ShadingMode::Clay;
+    }
+    return own;
+}
 
 /// Whether the request leaves a dataset out.
 inline bool isHidden(const FrameRequest& request, size_t dataset) {

@@ -16,7 +16,7 @@
 
 namespace vcp {
 
-static_assert(kMostSections == frame::kMaxSections);
+static_assert(kMostSections == frame::kMaxSections && kMostLights == frame::kMaxLights);
 
 namespace {
 
@@ -125,9 +125,13 @@ double errorToLift(const Dataset& dataset, const FrameRequest& request, double e
 }  // namespace
 
 LightDirections lightDirections(const FrameRequest& request, const CameraBasis& basis) {
-    const glm::dvec3 light = glm::normalize(glm::dvec3(request.shading.lightDirection));
-    if (!request.shading.lightFollowsCamera) return {light, glm::normalize(request.camera.up)};
-    return {basis.right * light.x + basis.up * light.y - basis.forward * light.z, basis.up};
+    const DirectedLight light{request.shading.lightFollowsCamera, request.shading.lightDirection};
+    return {towardsLight(light, basis), light.followsCamera ? basis.up : glm::normalize(request.camera.up)};
+}
+
+glm::dvec3 towardsLight(const DirectedLight& light, const CameraBasis& basis) {
+    const glm::dvec3 own = glm::normalize(glm::dvec3(light.direction));
+    return light.followsCamera ? basis.right * own.x + basis.up * own.y - basis.forward * own.z : own;
 }
 
 bool hasLight(const Shading& shading) {
@@ -172,7 +176,11 @@ frame::FrameConstants frameConstants(const FrameRequest& request, const Dataset*
     c.stripes = stripes;
     c.shadingMode = shadingMode(request.shading.mode);
     const LightDirections directions = lightDirections(request, basis);
-    c.lightDirection = toVec4(directions.light);
+    c.lightDirection = glm::vec4(glm::vec3(directions.light), request.shading.lightStrength);
+    c.opacity = request.shading.opacity;
+    c.lightCount = 1;
+    for (const DirectedLight& light : request.shading.moreLights)
+        c.moreLights[c.lightCount++ - 1] = glm::vec4(glm::vec3(towardsLight(light, basis)), light.strength);
     c.upDirection = toVec4(directions.sky);
     c.clay = encoded(request.shading.clay);
     c.cap = encoded(request.shading.cap);
@@ -237,6 +245,7 @@ uint64_t numberOfRays(const FrameRequest& request) {
     if (!hasLight(shading)) return number;
     add(shading.shadows), add(shading.occlusionRays), add(shading.occlusionRadius);
     add(shading.lightFollowsCamera), addPoint(shading.lightDirection);
+    for (const DirectedLight& light : shading.moreLights) add(light.followsCamera), addPoint(light.direction);
     // What is hidden is in no ray's way.
     const std::set<uint32_t> hidden(request.hidden.begin(), request.hidden.end());
     for (const uint32_t dataset : hidden) add(dataset);
@@ -289,6 +298,13 @@ Result<void> checkRequest(const FrameRequest& request) {
     for (const SectionPlane& plane : request.sections)
         if (!finite(plane.normal) || !std::isfinite(plane.offset) || !(glm::length(plane.normal) > 0))
             return usage("a section plane's normal is zero or not a number");
+    for (const DatasetLook& look : request.looks)
+        if (!(look.opacity >= 0 && look.opacity <= 1)) return usage("a dataset's opacity is not from 0 to 1");
+    if (request.shading.moreLights.size() >= kMostLights) return usage("at most 4 lights at once");
+    for (const DirectedLight& light : lightsOf(request.shading))
+        if (!finite(light.direction) || !(glm::length(light.direction) > 0) || !(light.strength >= 0) ||
+            light.strength > kStrongestLight)
+            return usage("a light's direction is zero or not a number, or its strength is not from 0 to 10");
     if (request.shading.occlusionRays > kMostOcclusionRays) return usage("at most 64 occlusion rays a pixel");
     if (!(request.shading.occlusionRadius >= 0) || !std::isfinite(request.shading.occlusionRadius))
         return usage("the occlusion radius must not be negative");

@@ -19,6 +19,9 @@ frame::FrameConstants frameConstants(const FrameRequest& request, const Dataset*
 struct LightDirections {
     glm::dvec3 light, sky;
 };
+/// Returns the unit direction towards a light, in the request's axes.
+glm::dvec3 towardsLight(const DirectedLight& light, const CameraBasis& basis);
+
 LightDirections lightDirections(const FrameRequest& request, const CameraBasis& basis);
 
 /// Whether rays of light are traced: where shading asks for them and shows light.

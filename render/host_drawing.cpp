@@ -119,7 +119,7 @@ struct PlacedLayer {
 /// Fills what a layer is made of.
 Result<void> place(PlacedLayer& layer, const FrameRequest& request) {
     Residency& residency = layer.drawn.residency;
-    layer.seen = requestIn(layer.drawn.placement, request);
+    layer.seen = requestIn(layer.drawn.placement, requestOfLook(request, layer.drawn.number));
     layer.cut = placedCut(residency, layer.drawn.view);
     VCP_TRY_ASSIGN(layer.scene, HostScene::create(hostGrid(residency.dataset().header), layer.cut.pages));
     if (request.sample == 0 && residency.asksRays(layer.drawn.view)) layer.marks.emplace(layer.scene->pages());
@@ -224,7 +224,7 @@ std::vector<uint64_t> cutNumbers(std::span<const HostDataset> datasets) {
 FrameStats hostStats(std::span<const HostDataset> datasets, const HostPicture& picture) {
     FrameStats stats{.rays = picture.depth.size(), .tracedRays = picture.depth.size(), .onHost = true};
     for (const HostDataset& each : datasets) {
-        stats.poolBytes += each.residency.pages().bytes();
+        stats.poolBytes = each.residency.pages().bytes();  // of all datasets
         stats.colourBytes += each.residency.colourBytes();
         stats.pagesInCut += uint32_t(each.residency.cut(each.view).size());
     }

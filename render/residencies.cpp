@@ -14,7 +14,22 @@ namespace vcp {
 namespace {
 
 constexpr uint64_t kLeastBudget = 1ull << 20;
-constexpr uint64_t kMoreThanAnyBudget = 1ull << 60;
+
+/// Adds what is drawn of a dataset.
+void add(UpdateResult& all, const UpdateResult& one) {
+    all.changed = all.changed || one.changed;
+    all.settled = all.settled && one.settled;
+    all.awaitsRays = all.awaitsRays || one.awaitsRays;
+    all.relaxed = all.relaxed || one.relaxed;
+    all.errorPixels = std::max(all.errorPixels, one.errorPixels);
+    all.pagesInCut += one.pagesInCut;
+    all.pagesWanted += one.pagesWanted;
+    all.pagesMissing += one.pagesMissing;
+    if (!one.drawable) return;
+    all.coarsestLevel = all.drawable ? std::min(all.coarsestLevel, one.coarsestLevel) : one.coarsestLevel;
+    all.finestLevel = std::max(all.finestLevel, one.finestLevel);
+    all.drawable = true;
+}
 
 }  // namespace
 
@@ -24,55 +39,44 @@ Result<void> checkBudget(uint64_t budgetBytes) {
                  .message = fmt::format("a budget of {} bytes is too small; at least {}", budgetBytes, kLeastBudget)};
 }
 
-uint64_t largestPoolBytes(const Dataset& dataset, bool withColour) {
-    return poolShapeFor(dataset, withColour && dataset.hasColour(), kMoreThanAnyBudget, kMoreThanAnyBudget).units *
-           kPoolUnitBytes;
-}
-
 Result<std::vector<PlacedResidency>> openResidencies(const PageMemorySource& memory, const RendererOptions& options,
                                                      std::vector<PlacedDataset> placed) {
-    ResidencyOptions each;
-    each.order = options.order;
-    each.hiddenToo = options.hiddenToo;
-    each.loader.withColour = options.colour;
-    const auto loaders = uint32_t(std::max<size_t>(placed.size(), 1));
-    uint32_t threads = options.loaderThreads;
-    if (threads == 0)
-        for (const PlacedDataset& one : placed) threads = std::max(threads, one.loaderThreads);
-    each.loader.threads = std::max(threads / loaders, 1u);
-    each.loader.allThreads = loaders * each.loader.threads;
-    each.uploadBytes = options.uploadBytes / loaders;
-    each.loader.heldBytes = options.ramBytes / loaders;
-    std::vector<uint64_t> bytes;
-    for (const PlacedDataset& one : placed) bytes.push_back(largestPoolBytes(*one.dataset, options.colour));
-    const std::vector<uint64_t> shares = budgetShares(options.budgetBytes, bytes);
     std::vector<PlacedResidency> opened;
-    for (size_t i = 0; i < placed.size(); ++i) {
-        each.budgetBytes = shares[i];
-        const bool isShared = placed.size() > 1 && !placed[i].dataset->pages.empty();
-        const uint64_t needed =
-            isShared ? placed[i].source->bytesToRead(0, options.colour && placed[i].dataset->hasColour()) : 0;
-        if (needed > each.loader.heldBytes)
+    if (placed.empty()) return opened;
+    ResidencyOptions all;
+    all.budgetBytes = options.budgetBytes;
+    all.uploadBytes = options.uploadBytes;
+    all.order = options.order;
+    all.hiddenToo = options.hiddenToo;
+    all.loader.withColour = options.colour;
+    all.loader.heldBytes = options.ramBytes;
+    all.loader.threads = options.loaderThreads;
+    std::vector<SceneSource::Part> parts;
+    for (PlacedDataset& one : placed) {
+        const uint64_t needed = placed.size() > 1 && !one.dataset->pages.empty()
+                                    ? one.source->bytesToRead(0, options.colour && one.dataset->hasColour())
+                                    : 0;
+        if (needed > options.ramBytes)
             return Error{.code = ErrorCode::Limit,
-                         .message = fmt::format("{} datasets share {} bytes of memory for pages on their way, and to "
-                                                "read the coarsest page of one takes {}: allow more",
-                                                placed.size(), options.ramBytes, needed)};
-        VCP_TRY_ASSIGN(auto residency,
-                       Residency::create(memory, each, std::move(placed[i].dataset), std::move(placed[i].source)));
-        opened.push_back({std::move(residency), placed[i].placement});
+                         .message = fmt::format("reading the coarsest page takes {} bytes of memory, more than the {} "
+                                                "bytes allowed for pages on their way: allow more",
+                                                needed, options.ramBytes),
+                         .file = one.source->name()};
+        if (options.loaderThreads == 0) all.loader.threads = std::max(all.loader.threads, one.loaderThreads);
+        parts.push_back({std::move(one.dataset), std::move(one.source)});
     }
+    VCP_TRY_ASSIGN(auto scene, SceneResidency::create(memory, all, std::move(parts)));
+    for (size_t i = 0; i < placed.size(); ++i)
+        opened.push_back({std::shared_ptr<Residency>(scene, &scene->dataset(i)), placed[i].placement});
     return opened;
 }
 
+SceneResidency* sceneOf(std::span<const PlacedResidency> datasets) {
+    return datasets.empty() ? nullptr : &datasets.front().residency->scene();
+}
+
 void waitForPage(std::span<const PlacedResidency> datasets, std::chrono::milliseconds timeout) {
-    if (datasets.size() == 1) return static_cast<void>(datasets.front().residency->waitForPage(timeout));
-    // The datasets take turns until one has pages.
-    constexpr std::chrono::milliseconds kTurn(5);
-    const auto until = std::chrono::steady_clock::now() + timeout;
-    for (const PlacedResidency& placed : datasets) {
-        if (std::chrono::steady_clock::now() >= until) return;
-        if (placed.residency->waitForPage(std::min(timeout, kTurn))) return;
-    }
+    if (SceneResidency* const scene = sceneOf(datasets)) static_cast<void>(scene->waitForPage(timeout));
 }
 
 double occlusionRadiusAmong(std::span<const PictureDataset> shown) {
@@ -92,15 +96,21 @@ double occlusionRadiusAmong(std::span<const PictureDataset> shown) {
 
 Result<std::optional<UpdateResult>> updateShown(std::span<const ShownResidency> shown, const FrameRequest& request,
                                                 ViewNumber number) {
+    std::optional<UpdateResult> none;
+    if (shown.empty()) return none;
+    SceneResidency& scene = shown.front().residency->scene();
+    std::vector<std::optional<SelectionView>> views(scene.datasets());
+    for (const ShownResidency& each : shown)
+        views[each.residency->number()] = selectionView(requestIn(each.placement, request));
+    VCP_TRY_ASSIGN(auto update, scene.update(views, number));
     std::vector<UpdateResult> results;
     uint64_t cuts = 0;
     for (const ShownResidency& each : shown) {
-        VCP_TRY_ASSIGN(auto one, each.residency->update(selectionView(requestIn(each.placement, request)), number));
-        *each.errorPixels = one.errorPixels;
-        results.push_back(std::move(one));
+        const size_t dataset = each.residency->number();
+        results.push_back(each.residency->cutOf(*views[dataset], update.cuts[dataset], number));
+        *each.errorPixels = results.back().errorPixels;
         cuts = (cuts + each.residency->cutNumber(number)) * 0x9e3779b97f4a7c15;
     }
-    std::optional<UpdateResult> all;
     for (size_t i = 0; i < shown.size(); ++i) {
         UpdateResult& one = results[i];
         if (shown.size() > 1 && hasLight(request.shading)) {
@@ -108,12 +118,9 @@ Result<std::optional<UpdateResult>> updateShown(std::span<const ShownResidency> 
             one.awaitsRays = one.awaitsRays || (one.settled && shown[i].residency->asksRays(number));
             one.settled = one.settled && !one.awaitsRays;
         }
-        if (all)
-            add(*all, one);
-        else
-            all = std::move(one);
+        add(update.all, one);
     }
-    return all;
+    return std::optional(std::move(update.all));
 }
 
 void seeAll(std::vector<SeenPages> seen, ViewNumber number) {
@@ -123,31 +130,6 @@ void seeAll(std::vector<SeenPages> seen, ViewNumber number) {
         if (!isFinal) each.hit.byLight.clear();
         each.residency->see(each.hit, each.view, each.cutNumber, number);
     }
-}
-
-void add(UpdateResult& all, const UpdateResult& one) {
-    all.changed = all.changed || one.changed;
-    all.settled = all.settled && one.settled;
-    all.awaitsRays = all.awaitsRays || one.awaitsRays;
-    all.relaxed = all.relaxed || one.relaxed;
-    all.errorPixels = std::max(all.errorPixels, one.errorPixels);
-    all.residentBytes += one.residentBytes;
-    all.bytesRead += one.bytesRead;
-    all.heldBytesMax += one.heldBytesMax;
-    all.loads += one.loads;
-    all.evictions += one.evictions;
-    all.reloads += one.reloads;
-    all.failures += one.failures;
-    all.pagesResident += one.pagesResident;
-    all.pagesInCut += one.pagesInCut;
-    all.pagesWanted += one.pagesWanted;
-    all.pagesMissing += one.pagesMissing;
-    all.pagesPending += one.pagesPending;
-    all.problems.insert(all.problems.end(), one.problems.begin(), one.problems.end());
-    if (!one.drawable) return;
-    all.coarsestLevel = all.drawable ? std::min(all.coarsestLevel, one.coarsestLevel) : one.coarsestLevel;
-    all.finestLevel = std::max(all.finestLevel, one.finestLevel);
-    all.drawable = true;
 }
 
 }  // namespace vcp

@@ -1,4 +1,5 @@
-// The residencies of the datasets in one picture: they share budgets and loader threads.
+// The residencies of the datasets in one picture: they share a pool and loader threads
+// (render/pages/scene_residency.h).
 #pragma once
 
 #include <chrono>
@@ -7,28 +8,28 @@
 #include <span>
 #include <vector>
 
-#include "render/pages/residency.h"
+#include "render/pages/scene_residency.h"
 #include "render/picture_renderer.h"
 
 namespace vcp {
 
 struct PlacedResidency {
-    std::unique_ptr<Residency> residency;
+    std::shared_ptr<Residency> residency;  ///< with the scene's, as long as one of its datasets is kept
     Similarity placement;
 };
 
 /// Refuses budgets that are too small for any page. Errors: Usage.
 Result<void> checkBudget(uint64_t budgetBytes);
 
-/// Makes the datasets' residencies, whose pools come from `memory`; options.budgetBytes and ramBytes are shared out
-/// among them. Errors: as of Residency::create; Limit, where they share too little memory.
+/// Makes the datasets' residencies, whose one pool comes from `memory`, within options.budgetBytes and ramBytes.
+/// Errors: as of SceneResidency::create.
 Result<std::vector<PlacedResidency>> openResidencies(const PageMemorySource& memory, const RendererOptions& options,
                                                      std::vector<PlacedDataset> datasets);
 
-/// Returns the largest pool that the dataset can use, as far as is known.
-uint64_t largestPoolBytes(const Dataset& dataset, bool withColour);
+/// Returns what the datasets share; null without any.
+SceneResidency* sceneOf(std::span<const PlacedResidency> datasets);
 
-/// Waits until one of them has read a page, none has anything to do, or the time is over.
+/// Waits until a page was read, there is nothing to read, or the time is over.
 void waitForPage(std::span<const PlacedResidency> datasets, std::chrono::milliseconds timeout);
 
 /// A dataset in a picture.
@@ -48,8 +49,9 @@ struct ShownResidency {
     double* errorPixels;  ///< gets the error of what is drawn
 };
 
-/// Updates what a view shows, and adds up the results; nothing where it shows nothing. With rays of light, each dataset
-/// is asked anew what they hit when what is drawn of another has changed. Errors: as of Residency::update.
+/// Updates what a view shows of one scene, and adds up the results; nothing where it shows nothing. With rays of light,
+/// each dataset is asked anew what they hit when what is drawn of another has changed. Errors: as of
+/// SceneResidency::update.
 Result<std::optional<UpdateResult>> updateShown(std::span<const ShownResidency> shown, const FrameRequest& request,
                                                 ViewNumber number = 0);
 
@@ -64,8 +66,5 @@ struct SeenPages {
 /// Tells residencies which pages the rays of one frame hit. Rays of light begin where the camera's rays hit, whatever
 /// they hit then: what they hit counts once those ask for nothing finer in any of them.
 void seeAll(std::vector<SeenPages> seen, ViewNumber number = 0);
-
-/// Adds the result of another dataset in the same picture.
-void add(UpdateResult& all, const UpdateResult& one);
 
 }  // namespace vcp

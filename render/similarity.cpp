@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
@@ -14,8 +13,6 @@ namespace vcp {
 namespace {
 
 constexpr double kSimilar = 1e-6;
-// Slots waste some bytes of a pool.
-constexpr uint64_t kSlack = 1 << 20;
 
 }  // namespace
 
@@ -55,23 +52,10 @@ FrameRequest requestIn(const Similarity& placement, const FrameRequest& request)
     local.shading.occlusionRadius /= placement.scale;
     if (!request.shading.lightFollowsCamera)
         local.shading.lightDirection = glm::vec3(placement.turnedFromWorld(glm::dvec3(request.shading.lightDirection)));
+    for (DirectedLight& light : local.shading.moreLights)
+        if (!light.followsCamera) light.direction = glm::vec3(placement.turnedFromWorld(glm::dvec3(light.direction)));
     for (SectionPlane& plane : local.sections) plane = planeIn(placement, plane);
     return local;
-}
-
-std::vector<uint64_t> budgetShares(uint64_t budgetBytes, std::span<const uint64_t> datasetBytes) {
-    std::vector<size_t> order(datasetBytes.size());
-    std::iota(order.begin(), order.end(), size_t{0});
-    std::sort(order.begin(), order.end(), [&](size_t a, size_t b) { return datasetBytes[a] < datasetBytes[b]; });
-    std::vector<uint64_t> shares(datasetBytes.size());
-    uint64_t left = budgetBytes;
-    for (size_t i = 0; i < order.size(); ++i) {
-        const uint64_t equal = left / (order.size() - i);
-        const uint64_t bytes = datasetBytes[order[i]];
-        shares[order[i]] = order.size() == 1 ? left : std::min(equal, bytes + bytes / 8 + kSlack);
-        left -= shares[order[i]];
-    }
-    return shares;
 }
 
 }  // namespace vcp

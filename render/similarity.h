@@ -45,8 +45,4 @@ SectionPlane planeIn(const Similarity& placement, const SectionPlane& plane);
 /// Returns the request as it is seen from a dataset's own space. Pixels, tiles and errors in pixels stay.
 FrameRequest requestIn(const Similarity& placement, const FrameRequest& request);
 
-/// Returns the share of `budgetBytes` of each dataset, by the bytes of the datasets: equal shares, but what a small one
-/// does not need goes to the larger ones. The sum is at most the budget.
-std::vector<uint64_t> budgetShares(uint64_t budgetBytes, std::span<const uint64_t> datasetBytes);
-
 }  // namespace vcp

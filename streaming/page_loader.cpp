@@ -117,14 +117,15 @@ std::optional<PageLoader::Run> PageLoader::beginRun(double now) {
     const Request first = wish->request;
     const uint64_t bytes = source_->bytesToRead(first, options_.withColour);
     if (bytes > options_.heldBytes) {
+        const PageOrigin origin = source_->originOf(first);
         queue_.begin(first);
         handOver(first,
                  Error{.code = ErrorCode::Limit,
                        .message = fmt::format("reading it takes {} bytes of memory, more than the {} bytes allowed for "
                                               "pages on their way; allow more, or build the file with smaller cells",
                                               bytes, options_.heldBytes),
-                       .file = source_->name(),
-                       .element = elementOf(first)});
+                       .file = origin.file,
+                       .element = elementOf(origin.request)});
         return Run{first, 0};
     }
     if (!fits(bytes)) return std::nullopt;
@@ -176,12 +177,12 @@ void PageLoader::finishRun(Run run, std::vector<Result<PageBytes>> pages) {
 std::vector<Result<PageBytes>> PageLoader::read(Run run) const {
     using Pages = std::vector<Result<PageBytes>>;
     auto pages = caught([&]() -> Result<Pages> { return source_->readRun(run.first, run.count, options_.withColour); },
-                        source_->name());
+                        source_->originOf(run.first).file);
     if (pages) return *std::move(pages);
     Pages failed;
     for (uint32_t i = 0; i < run.count; ++i) {
         Error error = pages.error();
-        error.element = elementOf(run.first.after(i));
+        error.element = elementOf(source_->originOf(run.first.after(i)).request);
         failed.emplace_back(std::move(error));
     }
     return failed;

@@ -4,6 +4,7 @@
 #include <bit>
 #include <limits>
 #include <queue>
+#include <tuple>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
@@ -18,11 +19,13 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 struct Candidate {
     double error;
     uint64_t page;
-    uint8_t octants;  // whose children are wanted
+    uint8_t octants;   // whose children are wanted
+    uint32_t dataset;  // its number among those that share the budget
 
-    /// The largest error comes first; among equals, the first in the directory.
+    /// The largest error comes first; among equals, the first dataset, and there the first in the directory.
     bool operator<(const Candidate& other) const {
-        return error != other.error ? error < other.error : page > other.page;
+        if (error != other.error) return error < other.error;
+        return std::tie(dataset, page) > std::tie(other.dataset, other.page);
     }
 };
 
@@ -100,15 +103,15 @@ uint8_t octantsWanted(const Dataset& dataset, uint64_t page, double error, const
 
 /// Returns what views want of a page's children; the error is a multiple of what is allowed, in the view where that is
 /// largest, and 0 where no view wants any.
-Candidate candidate(const Dataset& dataset, uint64_t page, std::span<const SelectionView> views,
-                    std::span<const PagesSeen* const> seen) {
-    Candidate made{0, page, 0};
-    for (size_t i = 0; i < views.size(); ++i) {
-        const double error = errorInView(dataset, page, views[i]);
-        const uint8_t octants = octantsWanted(dataset, page, error, views[i], seen.empty() ? nullptr : seen[i]);
+Candidate candidate(const ChoosingDataset& of, uint32_t number, uint64_t page) {
+    Candidate made{0, page, 0, number};
+    for (size_t i = 0; i < of.views.size(); ++i) {
+        const SelectionView& view = of.views[i];
+        const double error = errorInView(of.dataset, page, view);
+        const uint8_t octants = octantsWanted(of.dataset, page, error, view, of.seen.empty() ? nullptr : of.seen[i]);
         if (octants == 0) continue;
         made.octants |= octants;
-        made.error = std::max(made.error, error / std::max(views[i].errorPixels, kLeastErrorPixels));
+        made.error = std::max(made.error, error / std::max(view.errorPixels, kLeastErrorPixels));
     }
     return made;
 }
@@ -150,43 +153,88 @@ ChildrenBytes bytesOf(const PageEntry& parent, uint8_t octants, uint64_t parentB
 
 }  // namespace
 
-PageChoice choosePages(const Dataset& dataset, std::span<const SelectionView> views, uint64_t budgetBytes,
-                       std::span<const uint64_t> pageBytes, std::span<const uint8_t> states,
-                       std::span<const PagesSeen* const> seen) {
-    PageChoice choice;
-    choice.refined = SparseArray<uint16_t>(dataset.pages.size());
-    if (dataset.pages.empty() || states[0] != kAvailable || pageBytes[0] > budgetBytes) return choice;
-    std::priority_queue<Candidate> open;
-    choice.bytes = pageBytes[0];
-    choice.wanted.push_back({0, kInfinity});
-    open.push(candidate(dataset, 0, views, seen));
-    while (!open.empty()) {
-        const Candidate next = open.top();
-        open.pop();
-        if (next.error <= 0) break;
-        const PageEntry& entry = dataset.pages[next.page];
-        const uint8_t octants =
-            octantsWhere(dataset, entry, next.octants, [&](uint64_t child) { return states[child] != kUnavailable; });
-        if (octants == 0) continue;
-        const ChildrenBytes more = bytesOf(entry, octants, pageBytes[next.page], pageBytes);
+namespace {
+
+/// Goes down the trees of several datasets, the page that errs most first, until the budget is spent.
+class ChoosingWalk {
+public:
+    ChoosingWalk(std::span<const ChoosingDataset> datasets, uint64_t budgetBytes)
+        : datasets_(datasets), budgetBytes_(budgetBytes), choices_(datasets.size()) {}
+
+    std::vector<PageChoice> run() {
+        for (uint32_t i = 0; i < datasets_.size(); ++i) begin(i);
+        while (!open_.empty()) {
+            const Candidate next = open_.top();
+            open_.pop();
+            if (next.error <= 0 || !refine(next)) break;
+        }
+        for (PageChoice& choice : choices_) choice.relaxed = isRelaxed_;
+        return std::move(choices_);
+    }
+
+private:
+    void begin(uint32_t number) {
+        const ChoosingDataset& of = datasets_[number];
+        PageChoice& choice = choices_[number];
+        choice.refined = SparseArray<uint16_t>(of.dataset.pages.size());
+        if (of.dataset.pages.empty() || of.states[0] != kAvailable || bytes_ + of.pageBytes[0] > budgetBytes_) return;
+        take(choice, of.pageBytes[0]);
+        choice.wanted.push_back({0, kInfinity});
+        open_.push(candidate(of, number, 0));
+    }
+
+    /// Returns false where the budget is spent.
+    bool refine(const Candidate& next) {
+        const ChoosingDataset& of = datasets_[next.dataset];
+        PageChoice& choice = choices_[next.dataset];
+        const PageEntry& entry = of.dataset.pages[next.page];
+        const uint8_t octants = octantsWhere(of.dataset, entry, next.octants,
+                                             [&](uint64_t child) { return of.states[child] != kUnavailable; });
+        if (octants == 0) return true;
+        const ChildrenBytes more = bytesOf(entry, octants, of.pageBytes[next.page], of.pageBytes);
         if (!more.areKnown) {
             choice.awaited.push_back(next.page);
             choice.refined[next.page] = octants | kAwaited;
         }
-        if (choice.bytes + more.bytes > budgetBytes) {
-            choice.relaxed = more.areKnown;
-            break;
+        if (bytes_ + more.bytes > budgetBytes_) {
+            isRelaxed_ = more.areKnown;
+            return false;
         }
         // Room is kept for children that are not there yet, so that less urgent pages do not take it.
-        choice.bytes += more.bytes;
-        if (!more.areKnown) continue;
+        take(choice, more.bytes);
+        if (!more.areKnown) return true;
         choice.refined[next.page] = octants;
         forEachChild(entry, octants, [&](uint64_t child, uint32_t) {
             choice.wanted.push_back({child, next.error});
-            open.push(candidate(dataset, child, views, seen));
+            open_.push(candidate(of, next.dataset, child));
         });
+        return true;
     }
-    return choice;
+
+    void take(PageChoice& choice, uint64_t bytes) {
+        choice.bytes += bytes;
+        bytes_ += bytes;
+    }
+
+    const std::span<const ChoosingDataset> datasets_;
+    const uint64_t budgetBytes_;
+    uint64_t bytes_ = 0;  // of all choices
+    bool isRelaxed_ = false;
+    std::vector<PageChoice> choices_;
+    std::priority_queue<Candidate> open_;
+};
+
+}  // namespace
+
+std::vector<PageChoice> chooseTogether(std::span<const ChoosingDataset> datasets, uint64_t budgetBytes) {
+    return ChoosingWalk(datasets, budgetBytes).run();
+}
+
+PageChoice choosePages(const Dataset& dataset, std::span<const SelectionView> views, uint64_t budgetBytes,
+                       std::span<const uint64_t> pageBytes, std::span<const uint8_t> states,
+                       std::span<const PagesSeen* const> seen) {
+    const ChoosingDataset one{dataset, views, pageBytes, states, seen};
+    return std::move(chooseTogether({&one, 1}, budgetBytes).front());
 }
 
 namespace {

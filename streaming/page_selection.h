@@ -14,9 +14,10 @@
 // allowed: what lies behind other surfaces is not read, but what comes into view is nearly fine enough. What is drawn
 // is as fine as what is there allows. Elsewhere a page is replaced by all its children or none.
 //
-// Several views share one choice and one budget: a page is refined where any of them needs it, the largest error as
-// a multiple of what its view allows first. Each view draws the choice only as fine as it needs, so where the budget
-// suffices it draws what it would draw alone, and where it does not, all are relaxed together.
+// Several views, and several datasets of one scene, share one choice and one budget: a page is refined where any of
+// them needs it, the largest error as a multiple of what its view allows first. Each view draws the choice only as fine
+// as it needs, so where the budget suffices it draws what it would draw alone, and where it does not, all are relaxed
+// together.
 //
 // Source: Demir and Westermann 2015, section 4.4, with certified errors in place of voxel sizes.
 #pragma once
@@ -81,6 +82,19 @@ struct PageChoice {
 PageChoice choosePages(const Dataset& dataset, std::span<const SelectionView> views, uint64_t budgetBytes,
                        std::span<const uint64_t> pageBytes, std::span<const uint8_t> states,
                        std::span<const PagesSeen* const> seen = {});
+
+/// One of several datasets that share a budget; the fields are what choosePages takes.
+struct ChoosingDataset {
+    const Dataset& dataset;
+    std::span<const SelectionView> views;  ///< none: only the coarsest page is wanted
+    std::span<const uint64_t> pageBytes;
+    std::span<const uint8_t> states;
+    std::span<const PagesSeen* const> seen;
+};
+
+/// Does choosePages for several datasets: the page that errs most in its view goes first, whichever dataset it is of.
+/// Where the budget keeps a page of one of them from being refined, all are relaxed. Returns a choice for each.
+std::vector<PageChoice> chooseTogether(std::span<const ChoosingDataset> datasets, uint64_t budgetBytes);
 
 /// A page of a cut that is drawn only in some octants, each by itself: children are drawn in the others, or nothing
 /// where there is no child.

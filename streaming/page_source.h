@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "octree/page_reader.h"
@@ -10,6 +11,12 @@
 #include "streaming/stored_pages.h"
 
 namespace vcp {
+
+/// Where a page or block is, as messages name it.
+struct PageOrigin {
+    std::string file;  ///< empty where there is none
+    Request request;   ///< in that file
+};
 
 /// Delivers checked pages, and takes in blocks of the directory. Any thread may call, several at once. Entries of pages
 /// that are asked for are known.
@@ -32,8 +39,9 @@ public:
     virtual uint64_t keepWithin([[maybe_unused]] uint64_t bytes) const { return 0; }
     /// Ends reads that are under way soon, with Cancelled, where they could take long. Later reads work.
     virtual void interrupt() const {}
-    /// The name of the pages' file, for errors; empty where there is none.
+    /// The name of the pages' file, for errors; empty where there is none, or several.
     [[nodiscard]] virtual std::string name() const { return {}; }
+    [[nodiscard]] virtual PageOrigin originOf(Request request) const { return {name(), request}; }
 };
 
 /// Reads the pages of a .vcp file behind any ByteReader (openFile for a local one). Keeps none but by keepWithin().

@@ -49,13 +49,17 @@ std::optional<SelectionView> aheadOf(const SelectionView& view, const SelectionV
 
 bool isWhole(const Dataset& dataset) { return dataset.pages.blocksKnown() == dataset.pages.blocks(); }
 
-/// Returns the units of each page; only zeros where the directory comes in parts, as look() learns them later.
-SparseArray<uint64_t> unitsOfAll(const Dataset& dataset, bool withColour) {
-    SparseArray<uint64_t> units(dataset.pages.size());
-    if (isWhole(dataset))
-        std::transform(dataset.pages.begin(), dataset.pages.end(), units.data(),
-                       [&](const PageEntry& page) { return pageUnits(page, withColour); });
-    return units;
+/// Returns pages, each most urgent first, as one such list; pages of one dataset keep their order.
+std::vector<WantedPage> merged(std::vector<std::vector<WantedPage>> lists) {
+    std::vector<std::pair<double, WantedPage>> all;
+    for (const std::vector<WantedPage>& list : lists) {
+        double least = std::numeric_limits<double>::infinity();
+        for (const WantedPage& wanted : list) all.emplace_back(least = std::min(least, wanted.priority), wanted);
+    }
+    std::stable_sort(all.begin(), all.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
+    std::vector<WantedPage> pages;
+    for (const auto& [urgency, wanted] : all) pages.push_back(wanted);
+    return pages;
 }
 
 }  // namespace
@@ -64,19 +68,22 @@ uint64_t pageUnits(const PageEntry& page, bool withColour) {
     return unitsOf(uint64_t{page.pageBytes} + (withColour ? page.colourBytes : 0));
 }
 
-PoolShape poolShapeFor(const Dataset& dataset, bool withColour, uint64_t budgetBytes, uint64_t chunkBytes) {
+PoolShape poolShapeFor(std::span<const PooledDataset> datasets, uint64_t budgetBytes, uint64_t chunkBytes) {
     const uint64_t chunk = chunkBytes / kPoolUnitBytes;
-    if (!isWhole(dataset))
-        return {std::min(unitsOf(kMostGrowth * dataset.header.fileBytes) + dataset.pages.size(),
-                         budgetBytes / kPoolUnitBytes),
-                chunk};
-    uint64_t all = 0, largest = 1;
-    for (const PageEntry& page : dataset.pages) {
-        all += pageUnits(page, withColour);
-        largest = std::max(largest, pageUnits(page, withColour));
+    uint64_t all = 0, known = 0, largest = 1;
+    for (const auto& [dataset, withColour] : datasets) {
+        if (!isWhole(*dataset)) {
+            all += unitsOf(kMostGrowth * dataset->header.fileBytes) + dataset->pages.size();
+            continue;
+        }
+        for (const PageEntry& page : dataset->pages) {
+            known += pageUnits(page, withColour);
+            largest = std::max(largest, pageUnits(page, withColour));
+        }
     }
+    all += known;
     uint64_t useful = std::max<uint64_t>(all, 1);
-    if (all > chunk && chunk > largest) {
+    if (known > 0 && all > chunk && chunk > largest) {
         largest = largestPlanned(largest, chunk);
         const uint64_t chunks = (all + chunk - largest) / (chunk - largest + 1);
         useful = all + chunks * (largest - 1);
@@ -84,50 +91,76 @@ PoolShape poolShapeFor(const Dataset& dataset, bool withColour, uint64_t budgetB
     return {std::min(useful, budgetBytes / kPoolUnitBytes), chunk};
 }
 
-ResidencyPolicy::ResidencyPolicy(std::shared_ptr<const Dataset> dataset, bool withColour, PoolShape pool,
-                                 LoadOrder order, bool hiddenToo)
-    : dataset_(std::move(dataset)),
-      allocator_(pool.units, pool.unitsPerChunk),
-      pageUnits_(unitsOfAll(*dataset_, withColour)),
-      priorities_(dataset_, pageUnits_, order) {
-    pool_ = pool;
-    const size_t pages = dataset_->pages.size();
+ResidencyPolicy::ResidencyPolicy(std::span<const PooledDataset> datasets, PoolShape pool, LoadOrder order,
+                                 bool hiddenToo)
+    : allocator_(pool.units, pool.unitsPerChunk), pool_(pool) {
+    for (const PooledDataset& each : datasets) numbers_.add(each.dataset->pages.size(), each.dataset->pages.blocks());
+    const uint64_t pages = numbers_.pages();
+    pageUnits_ = SparseArray<uint64_t>(pages);
     resident_ = SparseArray<uint8_t>(pages);
     states_ = SparseArray<uint8_t>(pages);
     loadedIn_ = SparseArray<uint64_t>(pages);
     ranks_ = SparseArray<Rank>(pages);
-    withColour_ = withColour;
-    asksRays_ = dataset_->isCovering() && !hiddenToo;
-    if (isWhole(*dataset_)) {
-        if (pages > 0) largestUnits_ = *std::max_element(pageUnits_.data(), pageUnits_.data() + pages);
-    } else {
-        blocksSeen_ = SparseArray<uint8_t>(dataset_->pages.blocks());
-        learnBlocks();
+    for (const auto& [dataset, withColour] : datasets) {
+        const bool asksRays = dataset->isCovering() && !hiddenToo;
+        const uint64_t first = numbers_.firstPage(trees_.size());
+        const bool whole = isWhole(*dataset);
+        for (uint64_t page = 0; whole && page < dataset->pages.size(); ++page) {
+            pageUnits_[first + page] = pageUnits(dataset->pages[page], withColour);
+            largestUnits_ = std::max(largestUnits_, pageUnits_[first + page]);
+        }
+        const std::span<const uint64_t> units(pageUnits_.data() + first, dataset->pages.size());
+        trees_.push_back(Tree{.dataset = dataset,
+                              .withColour = withColour,
+                              .asksRays = asksRays,
+                              .priorities = LoadPriorities(dataset, units, order),
+                              .blocksSeen = SparseArray<uint8_t>(whole ? 0 : dataset->pages.blocks()),
+                              .views = {},
+                              .choice = {},
+                              .ahead = {}});
+        asksRays_ = asksRays_ || asksRays;
     }
+    learnBlocks();
     planFor(pool);
 }
 
-/// Takes over what became known of the directory since the last call.
+uint64_t ResidencyPolicy::coarsestUnits() const {
+    uint64_t units = 0;
+    for (size_t i = 0; i < trees_.size(); ++i)
+        if (!trees_[i].dataset->pages.empty()) units += pageUnits_[numbers_.firstPage(i)];
+    return units;
+}
+
+/// Takes over what became known of the directories since the last call.
 void ResidencyPolicy::learnBlocks() {
-    const PageDirectory& pages = dataset_->pages;
-    if (blocksSeen_.empty() || blocksKnown_ == pages.blocksKnown()) return;
-    for (uint64_t block = 0; block < blocksSeen_.size(); ++block) {
-        if (blocksSeen_[block] != 0 || !pages.knowsBlock(block)) continue;
-        blocksSeen_[block] = 1;
-        ++blocksKnown_;
+    bool isNews = false;
+    for (size_t i = 0; i < trees_.size(); ++i) isNews = learnBlocks(i) || isNews;
+    if (!isNews) return;
+    stale_ = true;
+    planFor(pool_);
+    // A page too large for a pool of several parts is refused, but the coarsest pages always have their places.
+    if (pool_.units > 0) planned_ = std::max(planned_, coarsestUnits());
+}
+
+bool ResidencyPolicy::learnBlocks(size_t number) {
+    Tree& tree = trees_[number];
+    const PageDirectory& pages = tree.dataset->pages;
+    if (tree.blocksSeen.empty() || tree.blocksKnown == pages.blocksKnown()) return false;
+    for (uint64_t block = 0; block < tree.blocksSeen.size(); ++block) {
+        if (tree.blocksSeen[block] != 0 || !pages.knowsBlock(block)) continue;
+        tree.blocksSeen[block] = 1;
+        ++tree.blocksKnown;
         const uint64_t first = block * kEntriesPerBlock,
                        end = std::min<uint64_t>(first + kEntriesPerBlock, pages.size());
-        for (uint64_t page = first; page < end; ++page) {
-            pageUnits_[page] = pageUnits(pages[page], withColour_);
+        for (uint64_t own = first; own < end; ++own) {
+            const uint64_t page = numbers_.firstPage(number) + own;
+            pageUnits_[page] = pageUnits(pages[own], tree.withColour);
             largestUnits_ = std::max(largestUnits_, pageUnits_[page]);
-            priorities_.learn(page, pageUnits_[page]);
+            tree.priorities.learn(own, pageUnits_[page]);
             if (states_[page] != kAvailable) states_[page] = kAvailable;
         }
     }
-    stale_ = true;
-    planFor(pool_);
-    // A page too large for a pool of several parts is refused, but the coarsest page always has its place.
-    if (pool_.units > 0) planned_ = std::max(planned_, pageUnits_[0]);
+    return true;
 }
 
 void ResidencyPolicy::planFor(PoolShape pool) {
@@ -148,29 +181,42 @@ void ResidencyPolicy::askAgain() {
     stale_ = true;
 }
 
-void ResidencyPolicy::look(const SelectionView& view, double seconds, ViewNumber number) {
+void ResidencyPolicy::look(std::span<const std::optional<SelectionView>> views, double seconds, ViewNumber number) {
+    assert(views.size() == trees_.size());
     ++round_;
     seconds_ = seconds;
     evictable_.reset();
     learnBlocks();
     const auto [known, isNew] = motions_.try_emplace(number);
     Motion& motion = known->second;
-    const bool moves = isNew || motion.view != view;
-    motion.later.reset();
-    if (moves && !isNew) motion.later = aheadOf(view, motion.view, seconds - motion.seconds);
-    if (moves) motion.seen.begin();
+    motion.sights.resize(trees_.size());
+    const bool moves = isNew || !std::equal(views.begin(), views.end(), motion.sights.begin(),
+                                            [](const auto& view, const Sight& sight) { return view == sight.view; });
+    for (size_t i = 0; i < trees_.size(); ++i) {
+        Sight& sight = motion.sights[i];
+        sight.later.reset();
+        if (moves && views[i] && sight.view) sight.later = aheadOf(*views[i], *sight.view, seconds - motion.seconds);
+        if (moves) sight.seen.begin();
+        sight.view = views[i];
+    }
     // A view that stands still plans nothing ahead.
     stale_ = stale_ || moves || motion.moves;
     if (moves || emptied_) stillSince_ = round_;
     emptied_ = false;
-    motion.view = view;
     motion.seconds = seconds;
     const bool stops = std::exchange(motion.moves, moves) && !moves;
     moving_ = std::any_of(motions_.begin(), motions_.end(), [](const auto& each) { return each.second.moves; });
     if (stops && !moving_) askAgain();
     if (stale_) choose();
-    for (const WantedPage& wanted : choice_.wanted)
-        if (const auto at = slots_.find(wanted.page); at != slots_.end()) at->second.lastWanted = round_;
+    for (size_t i = 0; i < trees_.size(); ++i)
+        for (const WantedPage& wanted : trees_[i].choice.wanted)
+            if (const auto at = slots_.find(numbers_.firstPage(i) + wanted.page); at != slots_.end())
+                at->second.lastWanted = round_;
+}
+
+bool ResidencyPolicy::hasLooked(ViewNumber number, size_t dataset) const {
+    const auto known = motions_.find(number);
+    return known != motions_.end() && known->second.sights[dataset].view;
 }
 
 void ResidencyPolicy::forgetView(ViewNumber number) {
@@ -178,72 +224,123 @@ void ResidencyPolicy::forgetView(ViewNumber number) {
     askAgain();
 }
 
-void ResidencyPolicy::see(const PagesHit& hit, const SelectionView& view, ViewNumber number) {
-    const auto known = motions_.find(number);
-    if (!asksRays_ || known == motions_.end()) return;
+void ResidencyPolicy::forgetView(ViewNumber number, size_t dataset) {
+    if (!hasLooked(number, dataset)) return;
+    std::vector<Sight>& sights = motions_.at(number).sights;
+    sights[dataset] = {};
+    if (std::none_of(sights.begin(), sights.end(), [](const Sight& sight) { return sight.view.has_value(); }))
+        motions_.erase(number);
+    askAgain();
+}
+
+void ResidencyPolicy::hear(const RayFeedback& feedback, const SelectionView& view, size_t dataset) {
+    trees_[dataset].priorities.hear(feedback, view, trees_[dataset].views.size());
+}
+
+void ResidencyPolicy::see(const PagesHit& hit, const SelectionView& view, ViewNumber number, size_t dataset) {
+    const Tree& tree = trees_[dataset];
+    if (!tree.asksRays || !hasLooked(number, dataset)) return;
     // Rays of light begin where the camera's rays hit: as long as those ask for finer pages, it is not known where.
     std::vector<uint64_t> pages = hit.byCamera;
-    if (hasAll(hit.byCamera)) pages.insert(pages.end(), hit.byLight.begin(), hit.byLight.end());
-    Motion& motion = known->second;
-    if (motion.view != view)
-        motion.seen.guess(*dataset_, pages);
-    else if (motion.seen.add(*dataset_, pages))
+    if (hasAll(hit.byCamera, dataset)) pages.insert(pages.end(), hit.byLight.begin(), hit.byLight.end());
+    Sight& sight = motions_.at(number).sights[dataset];
+    if (sight.view != view)
+        sight.seen.guess(*tree.dataset, pages);
+    else if (sight.seen.add(*tree.dataset, pages))
         stale_ = true;
 }
 
-bool ResidencyPolicy::hasAll(const std::vector<uint64_t>& pages) const {
-    return std::all_of(pages.begin(), pages.end(),
-                       [&](uint64_t page) { return isResident(page) || states_[page] == kUnavailable; });
+bool ResidencyPolicy::hasAll(const std::vector<uint64_t>& pages, size_t dataset) const {
+    const uint64_t first = numbers_.firstPage(dataset);
+    return std::all_of(pages.begin(), pages.end(), [&](uint64_t page) {
+        return isResident(first + page) || states_[first + page] == kUnavailable;
+    });
 }
 
-PageChoice ResidencyPolicy::chosenFor(std::span<const SelectionView> views) const {
-    std::vector<const PagesSeen*> seen;
-    for (const auto& [number, motion] : motions_) seen.push_back(seenBy(motion));
-    return choosePages(*dataset_, views, planned_, pageUnits_, states_, seen);
+std::vector<PageChoice> ResidencyPolicy::chosenFor(std::optional<SelectionView> Sight::*when) const {
+    std::vector<std::vector<SelectionView>> views(trees_.size());
+    std::vector<std::vector<const PagesSeen*>> seen(trees_.size());
+    std::vector<ChoosingDataset> choosing;
+    for (size_t i = 0; i < trees_.size(); ++i) {
+        for (const auto& [number, motion] : motions_) {
+            const Sight& sight = motion.sights[i];
+            if (!sight.view) continue;
+            views[i].push_back((sight.*when).value_or(*sight.view));
+            seen[i].push_back(seenBy(motion, i));
+        }
+        choosing.push_back({*trees_[i].dataset, views[i], ofTree(pageUnits_, i), ofTree(states_, i), seen[i]});
+    }
+    return chooseTogether(choosing, planned_);
+}
+
+void ResidencyPolicy::rank(PageChoice Tree::*choice, Rank rank) {
+    for (size_t i = 0; i < trees_.size(); ++i)
+        for (const WantedPage& wanted : (trees_[i].*choice).wanted) ranks_[numbers_.firstPage(i) + wanted.page] = rank;
 }
 
 void ResidencyPolicy::choose() {
-    views_.clear();
-    std::vector<SelectionView> later;
-    for (const auto& [number, motion] : motions_) {
-        views_.push_back(motion.view);
-        later.push_back(motion.later.value_or(motion.view));
+    bool goesOn = false;
+    for (size_t i = 0; i < trees_.size(); ++i) {
+        trees_[i].views.clear();
+        for (const auto& [number, motion] : motions_) {
+            const Sight& sight = motion.sights[i];
+            if (sight.view) trees_[i].views.push_back(*sight.view);
+            goesOn = goesOn || (sight.later && sight.later != sight.view);
+        }
     }
-    for (const WantedPage& wanted : ahead_.wanted) ranks_[wanted.page] = Rank::Stale;
-    for (const WantedPage& wanted : choice_.wanted) ranks_[wanted.page] = Rank::Stale;
+    rank(&Tree::ahead, Rank::Stale);
+    rank(&Tree::choice, Rank::Stale);
     chooseForViews();
-    ahead_ = {};
-    if (later != views_) ahead_ = chosenFor(later);
-    for (const WantedPage& wanted : ahead_.wanted) ranks_[wanted.page] = Rank::Ahead;
-    for (const WantedPage& wanted : choice_.wanted) ranks_[wanted.page] = Rank::Wanted;
+    std::vector<PageChoice> ahead(trees_.size());
+    if (goesOn) ahead = chosenFor(&Sight::later);
+    for (size_t i = 0; i < trees_.size(); ++i) {
+        trees_[i].ahead = std::move(ahead[i]);
+        ++trees_[i].version;
+    }
+    rank(&Tree::ahead, Rank::Ahead);
+    rank(&Tree::choice, Rank::Wanted);
     stale_ = false;
-    ++version_;
+}
+
+bool ResidencyPolicy::takesFewBytes(std::span<const PageChoice> choices) const {
+    double pixels = 0;
+    for (const auto& [number, motion] : motions_) {
+        const auto shown = std::find_if(motion.sights.begin(), motion.sights.end(),
+                                        [](const Sight& sight) { return sight.view.has_value(); });
+        if (shown != motion.sights.end()) pixels += shown->view->pixels;
+    }
+    uint64_t units = 0;
+    for (const PageChoice& choice : choices) {
+        if (!choice.awaited.empty() || choice.relaxed) return false;
+        units += choice.bytes;
+    }
+    return double(units * kPoolUnitBytes) <= kFewBytesAPixel * pixels;
 }
 
 void ResidencyPolicy::chooseForViews() {
+    const auto isRelaxed = [](const PageChoice& choice) { return choice.relaxed; };
     wantsHidden_ = true;
-    choice_ = chosenFor(views_);
-    if (!asksRays_ || lacksRoom_) return;
-    double pixels = 0;
-    for (const SelectionView& view : views_) pixels += view.pixels;
-    const bool isAllKnown = choice_.awaited.empty() && !choice_.relaxed;
-    if (isAllKnown && double(choice_.bytes * kPoolUnitBytes) <= kFewBytesAPixel * pixels) return;
-    wantsHidden_ = false;
-    PageChoice hit = chosenFor(views_);
-    if (hit.relaxed && !moving_) {
-        // What still views want must not depend on what was seen before.
-        for (auto& [number, motion] : motions_) motion.seen.dropGuess();
-        hit = chosenFor(views_);
+    std::vector<PageChoice> chosen = chosenFor(&Sight::view);
+    if (asksRays_ && !lacksRoom_ && !takesFewBytes(chosen)) {
+        wantsHidden_ = false;
+        std::vector<PageChoice> hit = chosenFor(&Sight::view);
+        if (std::any_of(hit.begin(), hit.end(), isRelaxed) && !moving_) {
+            // What still views want must not depend on what was seen before.
+            for (auto& [number, motion] : motions_)
+                for (Sight& sight : motion.sights) sight.seen.dropGuess();
+            hit = chosenFor(&Sight::view);
+        }
+        lacksRoom_ = wantsHidden_ = std::any_of(hit.begin(), hit.end(), isRelaxed);
+        if (lacksRoom_)
+            stillSince_ = round_;
+        else
+            chosen = std::move(hit);
     }
-    lacksRoom_ = wantsHidden_ = hit.relaxed;
-    if (lacksRoom_)
-        stillSince_ = round_;
-    else
-        choice_ = std::move(hit);
+    for (size_t i = 0; i < trees_.size(); ++i) trees_[i].choice = std::move(chosen[i]);
 }
 
 bool ResidencyPolicy::mayEvict(uint64_t page, const Resident& resident, Rank forRank) const {
-    if (page == 0 || rankOf(page) >= forRank) return false;
+    if (rankOf(page) >= forRank || numbers_.isCoarsest(page)) return false;
     return !moving_ || resident.loaded + kSettlingSeconds <= seconds_;
 }
 
@@ -269,7 +366,7 @@ void ResidencyPolicy::evict(uint64_t page) {
     pageAt_.erase(slot.firstUnit);
     slots_.erase(page);
     resident_[page] = 0;
-    ++version_;
+    changed(page);
     ++counts_.evictions;
 }
 
@@ -313,7 +410,7 @@ bool ResidencyPolicy::gather(uint64_t units, uint64_t most, std::vector<PageMove
         allocator_.release(from);
         allocator_.take(slot);
         moves.push_back({page, from, slot});
-        ++version_;
+        changed(page);
         ++counts_.moves;
         counts_.unitsMoved += slot.units;
     }
@@ -343,7 +440,7 @@ Placement ResidencyPolicy::place(uint64_t page) {
     if (evictable_ && mayEvict(page, placed, Rank::Wanted)) evictable_->push({rank, placed.lastWanted, page});
     pageAt_.emplace(placement.slot->firstUnit, page);
     resident_[page] = 1;
-    ++version_;
+    changed(page);
     ++counts_.loads;
     counts_.unitsLoaded += units;
     if (loadedIn_[page] == stillSince_ && !emptied_) ++counts_.reloads;
@@ -359,65 +456,104 @@ uint64_t ResidencyPolicy::unitsWithin(Rank forRank) const {
     return units;
 }
 
-DrawableCut ResidencyPolicy::drawable(ViewNumber number) const {
-    assert(hasLooked(number));
+std::vector<uint64_t> ResidencyPolicy::residentPages(size_t dataset) const {
+    const uint64_t first = numbers_.firstPage(dataset), end = first + trees_[dataset].dataset->pages.size();
+    std::vector<uint64_t> pages;
+    for (auto at = slots_.lower_bound(first); at != slots_.end() && at->first < end; ++at)
+        pages.push_back(at->first - first);
+    return pages;
+}
+
+DrawableCut ResidencyPolicy::drawable(ViewNumber number, size_t dataset) const {
+    assert(hasLooked(number, dataset));
     const Motion& motion = motions_.at(number);
-    return drawableCut(*dataset_, motion.view, choice_, resident_, seenBy(motion));
+    const Tree& tree = trees_[dataset];
+    return drawableCut(*tree.dataset, *motion.sights[dataset].view, tree.choice, ofTree(resident_, dataset),
+                       seenBy(motion, dataset));
 }
 
 PolicyOutcome ResidencyPolicy::finish(ViewNumber number) const {
     PolicyOutcome outcome;
-    outcome.drawable = drawable(number);
-    std::vector<WantedPage> missing;
-    std::copy_if(choice_.wanted.begin(), choice_.wanted.end(), std::back_inserter(missing),
-                 [&](const WantedPage& wanted) { return !isResident(wanted.page); });
-    outcome.missing = missing.size() + choice_.awaited.size();
+    std::vector<std::vector<WantedPage>> lists;
+    for (size_t i = 0; i < trees_.size(); ++i) {
+        const Tree& tree = trees_[i];
+        outcome.cuts.push_back(hasLooked(number, i) ? drawable(number, i) : DrawableCut());
+        std::vector<WantedPage> missing;
+        const uint64_t first = numbers_.firstPage(i);
+        std::copy_if(tree.choice.wanted.begin(), tree.choice.wanted.end(), std::back_inserter(missing),
+                     [&](const WantedPage& wanted) { return !isResident(first + wanted.page); });
+        outcome.missing.push_back(missing.size() + tree.choice.awaited.size());
+        lists.push_back(tree.priorities.ordered(std::move(missing), tree.views));
+        for (WantedPage& wanted : lists.back()) wanted.page += first;
+    }
     // Pages are wished for in order of urgency, as long as there is room for them.
     uint64_t room = unitsWithin(Rank::Wanted), reserved = 0;
     bool full = false;
     std::set<uint64_t> blocks;
-    wishForBlocks(choice_.awaited, kBlockUrgency, blocks, outcome.wishes);
-    for (const WantedPage& wanted : priorities_.ordered(std::move(missing), views_)) {
+    wishForBlocks(&Tree::choice, kBlockUrgency, blocks, outcome.wishes);
+    for (const WantedPage& wanted : merged(std::move(lists))) {
         full = full || reserved + pageUnits_[wanted.page] > room;
         if (full) continue;
         reserved += pageUnits_[wanted.page];
         outcome.wishes.push_back({wanted.page, wanted.priority});
     }
-    if (full || (ahead_.wanted.empty() && ahead_.awaited.empty())) return outcome;
+    const bool goesOn = std::any_of(trees_.begin(), trees_.end(), [](const Tree& tree) {
+        return !tree.ahead.wanted.empty() || !tree.ahead.awaited.empty();
+    });
+    if (full || !goesOn) return outcome;
     room = unitsWithin(Rank::Ahead);
     double urgency = 1e6;
-    for (const WantedPage& wanted : ahead_.wanted) {
-        if (isResident(wanted.page) || rankOf(wanted.page) != Rank::Ahead) continue;
+    for (const WantedPage& wanted : ahead()) {
         reserved += pageUnits_[wanted.page];
         if (reserved > room) break;
         // Parents, which come before their children, are no less urgent.
         urgency = std::min(urgency, wanted.priority);
         outcome.wishes.push_back({wanted.page, urgency * kAheadUrgency});
     }
-    wishForBlocks(ahead_.awaited, urgency * kAheadUrgency, blocks, outcome.wishes);
+    wishForBlocks(&Tree::ahead, urgency * kAheadUrgency, blocks, outcome.wishes);
     return outcome;
 }
 
+/// Returns the missing pages that views will want and do not want yet, most urgent first, as the scene numbers them.
+std::vector<WantedPage> ResidencyPolicy::ahead() const {
+    std::vector<std::vector<WantedPage>> lists;
+    for (size_t i = 0; i < trees_.size(); ++i) {
+        lists.emplace_back();
+        for (WantedPage wanted : trees_[i].ahead.wanted) {
+            wanted.page += numbers_.firstPage(i);
+            if (!isResident(wanted.page) && rankOf(wanted.page) == Rank::Ahead) lists.back().push_back(wanted);
+        }
+    }
+    return merged(std::move(lists));
+}
+
 /// Wishes for the blocks that hold children of the awaited pages, but those in `blocks`: they are wished for already.
-void ResidencyPolicy::wishForBlocks(const std::vector<uint64_t>& awaited, double urgency, std::set<uint64_t>& blocks,
+void ResidencyPolicy::wishForBlocks(PageChoice Tree::*choice, double urgency, std::set<uint64_t>& blocks,
                                     std::vector<Wish>& wishes) const {
-    uint64_t last = UINT64_MAX;
-    for (const uint64_t page : awaited) {
-        for (const uint64_t child : childrenOf(dataset_->pages[page])) {
-            const uint64_t block = child / kEntriesPerBlock;
-            if (block == last || blocksSeen_[block] != 0 || !blocks.insert(block).second) continue;
-            last = block;
-            wishes.push_back({Request::directoryBlock(block), urgency});
+    for (size_t i = 0; i < trees_.size(); ++i) {
+        const Tree& tree = trees_[i];
+        uint64_t last = UINT64_MAX;
+        for (const uint64_t page : (tree.*choice).awaited) {
+            for (const uint64_t child : childrenOf(tree.dataset->pages[page])) {
+                const uint64_t own = child / kEntriesPerBlock;
+                if (own == last || tree.blocksSeen[own] != 0) continue;
+                const Request block = numbers_.inScene(i, Request::directoryBlock(own));
+                if (!blocks.insert(block.number).second) continue;
+                last = own;
+                wishes.push_back({block, urgency});
+            }
         }
     }
 }
 
-/// The state of a page, or those of all pages in a block of the directory.
+/// The state of a page, or those of all pages in a block of a directory.
 std::span<uint8_t> ResidencyPolicy::statesOf(Request request) {
     const std::span<uint8_t> states(states_);
     if (request.isPage()) return states.subspan(request.number, 1);
-    const uint64_t first = request.number * kEntriesPerBlock;
-    return states.subspan(first, std::min<uint64_t>(kEntriesPerBlock, states.size() - first));
+    const size_t dataset = numbers_.datasetOf(request);
+    const uint64_t first = numbers_.inDataset(request).number * kEntriesPerBlock;
+    return states.subspan(numbers_.firstPage(dataset) + first,
+                          std::min<uint64_t>(kEntriesPerBlock, trees_[dataset].dataset->pages.size() - first));
 }
 
 bool ResidencyPolicy::giveUp(Request request) {
@@ -431,11 +567,15 @@ bool ResidencyPolicy::giveUp(Request request) {
 uint64_t ResidencyPolicy::bytesHeld() const {
     constexpr uint64_t kNode = 4 * sizeof(void*);  // a node of a map, beside its value
     const auto bytesOf = [](const auto& vector) { return vector.capacity() * sizeof(vector[0]); };
-    uint64_t bytes = pageUnits_.bytes() + resident_.bytes() + states_.bytes() + blocksSeen_.bytes() +
-                     loadedIn_.bytes() + bytesOf(views_) + bytesOf(ahead_.wanted) + ahead_.refined.bytes() +
-                     ranks_.bytes();
-    bytes += bytesOf(choice_.wanted) + choice_.refined.bytes() + priorities_.bytesHeld() + allocator_.bytesHeld();
-    for (const auto& [number, motion] : motions_) bytes += motion.seen.bytesHeld();
+    uint64_t bytes = pageUnits_.bytes() + resident_.bytes() + states_.bytes() + loadedIn_.bytes() + ranks_.bytes() +
+                     allocator_.bytesHeld();
+    for (const Tree& tree : trees_) {
+        bytes += sizeof(tree) + tree.blocksSeen.bytes() + bytesOf(tree.views) + tree.priorities.bytesHeld();
+        for (const PageChoice* choice : {&tree.choice, &tree.ahead})
+            bytes += bytesOf(choice->wanted) + choice->refined.bytes();
+    }
+    for (const auto& [number, motion] : motions_)
+        for (const Sight& sight : motion.sights) bytes += sizeof(sight) + sight.seen.bytesHeld();
     bytes += slots_.size() * (sizeof(*slots_.begin()) + kNode) + pageAt_.size() * (sizeof(*pageAt_.begin()) + kNode);
     return bytes + motions_.size() * (sizeof(*motions_.begin()) + kNode);
 }

@@ -1,5 +1,6 @@
-// Decides which pages of a dataset are in the pool, where, and which are wished for. Pure: no threads, no clock, no
-// GPU; a round's outcome depends on the views, the pages that were placed, the time it is told, and nothing else.
+// Decides which pages of a scene's datasets are in the pool, where, and which are wished for. Pure: no threads, no
+// clock, no GPU; a round's outcome depends on the views, the pages that were placed, the time it is told, and nothing
+// else.
 //
 // A round, one for each update of a view:
 //
@@ -9,6 +10,10 @@
 //       carry out placement.moves, then write the page into placement.slot
 //   outcome = policy.finish();               // what can be drawn, what to read next
 //
+// The datasets share the pool, and it goes to what is seen: among the pages of all of them, the one that errs most in
+// its view is refined first (page_selection.h). Pages and blocks of the second dataset are numbered behind those of the
+// first, and so on (scene_numbers.h); what rays and cuts name are the numbers of a dataset's own.
+//
 // Several views, each with a number of its own, share the pool: what any of them wanted in its last look() is wanted
 // (page_selection.h), until forgetView().
 //
@@ -17,7 +22,7 @@
 //   its fragments moved together. So all still views settle, on pages that depend on the views, the pool's
 //   size and the pages that cannot be read, and not on what was there before.
 // - Parents before children; children are evicted before parents; what a view wants is not evicted, so
-//   still views load no page twice. The coarsest page is wanted by all views.
+//   still views load no page twice. Each dataset's coarsest page is always wanted.
 // - Hysteresis: while a view moves, a page that came less than kSettlingSeconds ago is not evicted
 //   for another, and pages that would need its place are not wished for.
 // - Where the directory comes in parts, views wish for the blocks that they must know, before all pages but the
@@ -44,6 +49,7 @@
 #include "streaming/load_order.h"
 #include "streaming/page_selection.h"
 #include "streaming/request.h"
+#include "streaming/scene_numbers.h"
 #include "streaming/slot_allocator.h"
 
 namespace vcp {
@@ -61,9 +67,15 @@ struct PoolShape {
     uint64_t units = 0, unitsPerChunk = 0;
 };
 
-/// Returns the largest useful pool within a budget: never more bytes, and no more than the dataset can fill; where only
-/// part of its directory is known, no more than kMostGrowth times the file's bytes and a unit a page.
-PoolShape poolShapeFor(const Dataset& dataset, bool withColour, uint64_t budgetBytes, uint64_t chunkBytes);
+/// A dataset whose pages are in the pool.
+struct PooledDataset {
+    std::shared_ptr<const Dataset> dataset;
+    bool withColour = false;
+};
+
+/// Returns the largest useful pool within a budget: never more bytes, and no more than the datasets can fill; where
+/// only part of a directory is known, no more for it than kMostGrowth times the file's bytes and a unit a page.
+PoolShape poolShapeFor(std::span<const PooledDataset> datasets, uint64_t budgetBytes, uint64_t chunkBytes);
 
 inline constexpr uint64_t kMostGrowth = 8;
 
@@ -88,38 +100,41 @@ struct PolicyCounts {
 };
 
 struct PolicyOutcome {
-    DrawableCut drawable;      ///< what this view draws
-    std::vector<Wish> wishes;  ///< of all views
-    uint64_t missing = 0;      ///< pages that some view wants and that are not resident
+    std::vector<DrawableCut> cuts;  ///< for each dataset, what this view draws; empty where it does not show it
+    std::vector<Wish> wishes;       ///< of all views
+    std::vector<uint64_t> missing;  ///< for each dataset, the pages that some view wants and that are not resident
 };
 
 class ResidencyPolicy {
 public:
     /// `pool` is made by poolShapeFor. `order` decides what is read first, and nothing else. `hiddenToo`: views want
     /// what no ray hits, too, also where pages cover what is below them.
-    ResidencyPolicy(std::shared_ptr<const Dataset> dataset, bool withColour, PoolShape pool,
-                    LoadOrder order = LoadOrder::Feedback, bool hiddenToo = false);
+    ResidencyPolicy(std::span<const PooledDataset> datasets, PoolShape pool, LoadOrder order = LoadOrder::Feedback,
+                    bool hiddenToo = false);
 
-    /// Whether the coarsest page fits into the pool.
-    [[nodiscard]] bool hasRoom() const { return !pageUnits_.empty() && pageUnits_[0] <= planned_; }
+    [[nodiscard]] const SceneNumbers& numbers() const { return numbers_; }
+    /// The units that the coarsest pages of all datasets take, and whether the pool has room for them.
+    [[nodiscard]] uint64_t coarsestUnits() const;
+    [[nodiscard]] bool hasRoom() const { return coarsestUnits() <= planned_; }
 
-    /// Says what a view sees. `seconds`: the time on any clock; never less than before.
-    void look(const SelectionView& view, double seconds, ViewNumber number = 0);
-    /// Forgets a view that is gone.
+    /// Says what a view sees: a view for each dataset, in its own coordinates, or none where it does not show it.
+    /// `seconds`: the time on any clock; never less than before.
+    void look(std::span<const std::optional<SelectionView>> views, double seconds, ViewNumber number = 0);
+    /// Forgets a view that is gone; the other, that it showed a dataset.
     void forgetView(ViewNumber number);
-    /// Takes in what the rays of a frame of `view` met: the pages they ask for are wished for first.
-    void hear(const RayFeedback& feedback, const SelectionView& view) {
-        priorities_.hear(feedback, view, views_.size());
-    }
-    /// Takes in which pages the rays of a frame hit, and where they began: a frame of `view`, which is what that view
-    /// saw at its last look() or before. What it asks for is wanted from the next look() on.
-    void see(const PagesHit& hit, const SelectionView& view, ViewNumber number = 0);
-    /// Whether pages that rays ask for are there, or cannot be read: what rays hit is then known for good.
-    [[nodiscard]] bool hasAll(const std::vector<uint64_t>& pages) const;
+    void forgetView(ViewNumber number, size_t dataset);
+    /// Takes in what the rays of a frame of `view` met of a dataset: the pages they ask for are wished for first.
+    void hear(const RayFeedback& feedback, const SelectionView& view, size_t dataset = 0);
+    /// Takes in which pages of a dataset the rays of a frame hit, and where they began: a frame of `view`, which is
+    /// what that view saw at its last look() or before. What it asks for is wanted from the next look() on.
+    void see(const PagesHit& hit, const SelectionView& view, ViewNumber number = 0, size_t dataset = 0);
+    /// Whether pages of a dataset that rays ask for are there, or cannot be read: what rays hit is then known for good.
+    [[nodiscard]] bool hasAll(const std::vector<uint64_t>& pages, size_t dataset = 0) const;
     Placement place(uint64_t page);
-    /// Returns what the view can draw and what to read. Precondition: hasLooked(number).
+    /// Returns what the view can draw and what to read. Precondition: it was looked at.
     [[nodiscard]] PolicyOutcome finish(ViewNumber number = 0) const;
-    [[nodiscard]] DrawableCut drawable(ViewNumber number) const;
+    /// Returns what the view draws of a dataset. Precondition: hasLooked(number, dataset).
+    [[nodiscard]] DrawableCut drawable(ViewNumber number, size_t dataset) const;
 
     /// The page, or the pages of the directory's block, cannot be read: from the next look() their parents are drawn in
     /// their place. True the first time.
@@ -131,12 +146,13 @@ public:
     /// Sets another pool, which is empty; from the next look() on, views want what fits into it. Forgets all pages, but
     /// not which of them cannot be read.
     void setPool(PoolShape pool);
-    [[nodiscard]] bool hasLooked(ViewNumber number = 0) const { return motions_.contains(number); }
+    /// Whether the view showed the dataset when it was last looked at.
+    [[nodiscard]] bool hasLooked(ViewNumber number, size_t dataset) const;
     /// Whether a view moved when it was last looked at.
     [[nodiscard]] bool isMoving() const { return moving_; }
-    /// A counter that grows with each change that can affect a cut or a page's place.
-    [[nodiscard]] uint64_t version() const { return version_; }
-    /// Approximate bytes of memory that this takes at most: bounded by the dataset, whatever the number of rounds.
+    /// A counter that grows with each change that can affect a cut of a dataset or the place of one of its pages.
+    [[nodiscard]] uint64_t version(size_t dataset = 0) const { return trees_[dataset].version; }
+    /// Approximate bytes of memory that this takes at most: bounded by the datasets, whatever the number of rounds.
     [[nodiscard]] uint64_t bytesHeld() const;
 
     [[nodiscard]] bool isResident(uint64_t page) const { return resident_[page] != 0; }
@@ -144,11 +160,8 @@ public:
     [[nodiscard]] PoolSlot slotOf(uint64_t page) const { return slots_.at(page).slot; }
     [[nodiscard]] uint64_t unitsTaken() const { return allocator_.unitsTaken(); }
     [[nodiscard]] size_t pagesResident() const { return slots_.size(); }
-    /// Calls visit(page) for every resident page, ascending.
-    template <class Visit>
-    void forEachResident(Visit&& visit) const {
-        for (const auto& [page, resident] : slots_) visit(page);
-    }
+    /// Returns the resident pages of a dataset, ascending.
+    [[nodiscard]] std::vector<uint64_t> residentPages(size_t dataset) const;
     [[nodiscard]] const PolicyCounts& counts() const { return counts_; }
 
 private:
@@ -168,12 +181,29 @@ private:
             return std::tuple(other.rank, other.lastWanted, page) < std::tuple(rank, lastWanted, other.page);
         }
     };
-    struct Motion {
-        SelectionView view;
-        double seconds = 0;                  // time of the last look
+    /// What a view sees of a dataset.
+    struct Sight {
+        std::optional<SelectionView> view;   // none: it is not shown
         std::optional<SelectionView> later;  // where the view will be, while it moves
-        bool moves = false;
         PagesSeen seen;
+    };
+    struct Motion {
+        std::vector<Sight> sights;  // for each dataset
+        double seconds = 0;         // time of the last look
+        bool moves = false;
+    };
+    /// A dataset, the tree of its pages, and what views want of it. Pages have the dataset's own numbers here.
+    struct Tree {
+        std::shared_ptr<const Dataset> dataset;
+        bool withColour = false;
+        bool asksRays = false;  // pages cover the surface of those below them
+        LoadPriorities priorities;
+        SparseArray<uint8_t> blocksSeen;  // for each block of the directory; empty: all are seen
+        uint64_t blocksKnown = 0;         // the blocks that were seen
+        std::vector<SelectionView> views;
+        PageChoice choice;
+        PageChoice ahead;  // what views will want where they are going, while they move
+        uint64_t version = 0;
     };
     [[nodiscard]] Rank rankOf(uint64_t page) const { return ranks_[page]; }
     /// Whether a page may go to make room for one of rank `forRank`.
@@ -183,49 +213,54 @@ private:
     bool gather(uint64_t units, uint64_t most, std::vector<PageMove>& moves);
     void planFor(PoolShape pool);
     void learnBlocks();
+    bool learnBlocks(size_t number);
     void choose();
-    [[nodiscard]] PageChoice chosenFor(std::span<const SelectionView> views) const;
-    /// Chooses what views_ want, and whether that depends on rays.
+    /// Chooses what views want, now or where they will be; a choice for each dataset.
+    [[nodiscard]] std::vector<PageChoice> chosenFor(std::optional<SelectionView> Sight::*when) const;
+    /// Chooses what views want now, and whether that depends on rays.
     void chooseForViews();
-    /// What a view's rays hit; null: all pages count as hit.
-    [[nodiscard]] const PagesSeen* seenBy(const Motion& motion) const {
-        return asksRays_ && !wantsHidden_ ? &motion.seen : nullptr;
+    [[nodiscard]] bool takesFewBytes(std::span<const PageChoice> choices) const;
+    void rank(PageChoice Tree::*choice, Rank rank);
+    /// What a view's rays hit of a dataset; null: all pages count as hit.
+    [[nodiscard]] const PagesSeen* seenBy(const Motion& motion, size_t dataset) const {
+        return trees_[dataset].asksRays && !wantsHidden_ ? &motion.sights[dataset].seen : nullptr;
     }
+    /// The elements of an array that belong to a dataset.
+    template <class T>
+    [[nodiscard]] std::span<const T> ofTree(const SparseArray<T>& all, size_t dataset) const {
+        return {all.data() + numbers_.firstPage(dataset), trees_[dataset].dataset->pages.size()};
+    }
+    [[nodiscard]] std::vector<WantedPage> ahead() const;
+    void changed(uint64_t page) { ++trees_[numbers_.datasetOf(page)].version; }
     /// Has views want only what rays hit, as far as there is room.
     void askAgain();
     [[nodiscard]] std::span<uint8_t> statesOf(Request request);
-    void wishForBlocks(const std::vector<uint64_t>& awaited, double urgency, std::set<uint64_t>& blocks,
+    void wishForBlocks(PageChoice Tree::*choice, double urgency, std::set<uint64_t>& blocks,
                        std::vector<Wish>& wishes) const;
     [[nodiscard]] uint64_t unitsWithin(Rank forRank) const;
 
-    std::shared_ptr<const Dataset> dataset_;
+    SceneNumbers numbers_;
     SlotAllocator allocator_;
     SparseArray<uint64_t> pageUnits_;  // 0: the page's entry is not known yet
     uint64_t largestUnits_ = 1;        // largest of pageUnits_
-    bool withColour_ = false;
-    LoadPriorities priorities_;
+    std::vector<Tree> trees_;
     PoolShape pool_;
     uint64_t planned_ = 0;  // units that views may want together
     std::map<uint64_t, Resident> slots_;
     std::map<uint64_t, uint64_t> pageAt_;                      // by the first unit of its slot
     std::optional<std::priority_queue<Evictable>> evictable_;  // made once a page had to go; some may be gone
     SparseArray<uint8_t> resident_;
-    SparseArray<uint8_t> states_;      // a PageState for each page
-    SparseArray<uint8_t> blocksSeen_;  // for each block of the directory; empty: all are seen
-    uint64_t blocksKnown_ = 0;         // the blocks that were seen
-    SparseArray<uint64_t> loadedIn_;   // for each page, stillSince_ of the still view in which it was last placed
+    SparseArray<uint8_t> states_;     // a PageState for each page
+    SparseArray<uint64_t> loadedIn_;  // for each page, stillSince_ of the still view in which it was last placed
 
     std::map<ViewNumber, Motion> motions_;
-    std::vector<SelectionView> views_;  // the views of motions_
-    PageChoice choice_;
-    PageChoice ahead_;  // what views will want where they are going, while they move
     SparseArray<Rank> ranks_;
-    bool asksRays_ = false;     // pages cover the surface of those below them
+    bool asksRays_ = false;     // some dataset's pages cover the surface of those below them
     bool wantsHidden_ = false;  // views want all that is in their frustum
     bool lacksRoom_ = false;    // for what rays hit, as was found since views stand still
     bool moving_ = false, stale_ = true, emptied_ = false;
     double seconds_ = 0;
-    uint64_t round_ = 0, stillSince_ = 0, version_ = 0;
+    uint64_t round_ = 0, stillSince_ = 0;
     PolicyCounts counts_;
 };
 

@@ -150,6 +150,7 @@ void Viewer::show(const std::vector<PlacedDataset>& datasets, const MesoScene& s
     sectionDrag_.reset();
     sectionAnchors_.clear();
     hidden_.clear();
+    looks_.clear();
     flySpeed_ = 1;
     status_.name = std::move(name);
     status_.update = {};
@@ -484,7 +485,18 @@ FrameRequest Viewer::requestWith(int reduction) const {
     request.sectionCaps = sectionCaps_;
     request.march = options_.march;
     request.hidden = hidden_;
+    request.looks = looks_;
     return request;
+}
+
+DatasetLook Viewer::lookOf(uint32_t dataset) const {
+    const auto at = std::ranges::find(looks_, dataset, &DatasetLook::dataset);
+    return at != looks_.end() ? *at : DatasetLook{.dataset = dataset, .colour = {}};
+}
+
+void Viewer::setLook(const DatasetLook& look) {
+    std::erase_if(looks_, [&](const DatasetLook& each) { return each.dataset == look.dataset; });
+    if (look != DatasetLook{.dataset = look.dataset, .colour = {}}) looks_.push_back(look);
 }
 
 FrameRequest Viewer::pictureOf(glm::ivec2 size) const {
@@ -531,9 +543,10 @@ bool Viewer::isCheaper() const {
 
 bool Viewer::isAtRest() const { return status_.update.settled && !isCheaper() && !isSentSomewhere(); }
 
+uint32_t Viewer::mostSamples() const { return std::min(mostSamples_, samplesOf(request_, options_.samples)); }
+
 bool Viewer::wantsSamples() const {
-    return isOpen_ && drawn_ == request_ && !pagesChanged_ && isAtRest() &&
-           status_.samples < std::min(mostSamples_, samplesOf(request_, options_.samples));
+    return isOpen_ && drawn_ == request_ && !pagesChanged_ && isAtRest() && status_.samples < mostSamples();
 }
 
 NextStep Viewer::nextStep(double now) {

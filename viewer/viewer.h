@@ -209,6 +209,12 @@ public:
     /// The numbers of the datasets that are not shown, in the order of open(); empty after it.
     [[nodiscard]] const std::vector<uint32_t>& hidden() const { return hidden_; }
     void setHidden(std::vector<uint32_t> datasets) { hidden_ = std::move(datasets); }
+    /// Looks of datasets that are not shown as they are.
+    [[nodiscard]] const std::vector<DatasetLook>& looks() const { return looks_; }
+    void setLooks(std::vector<DatasetLook> looks) { looks_ = std::move(looks); }
+    /// The look of one of them, and another one for it.
+    [[nodiscard]] DatasetLook lookOf(uint32_t dataset) const;
+    void setLook(const DatasetLook& look);
     /// Lets section planes be gripped from now on; for a host that draws the handles. `scale`: as for sectionHandle();
     /// 0: not any more.
     void showSectionHandles(double scale) { handleScale_ = scale; }
@@ -219,6 +225,8 @@ public:
     [[nodiscard]] double errorPixels() const { return options_.errorPixels; }
     void setErrorPixels(double pixels) { options_.errorPixels = pixels; }
     [[nodiscard]] uint32_t samples() const { return options_.samples; }
+    /// Samples that the picture of now comes to: one, where it shows numbers.
+    [[nodiscard]] uint32_t mostSamples() const;
     /// Sets how many samples pictures have at rest, 1 to kMostSamples; a picture with more keeps them.
     void setSamples(uint32_t samples) { options_.samples = samples; }
     /// Sets the budget of the page pool, from now on. Errors: those of Renderer::setBudgets.
@@ -278,6 +286,7 @@ private:
     std::optional<SectionDrag> sectionDrag_;
     Caps sectionCaps_ = Caps::None;
     std::vector<uint32_t> hidden_;
+    std::vector<DatasetLook> looks_;
     glm::ivec2 size_{0};
     PictureMargins covered_;
 

@@ -2,8 +2,10 @@
 #pragma once
 
 #include <glm/trigonometric.hpp>
+#include <glm/vec4.hpp>
 
 #include "octree/surface/leaf_math.h"
+#include "render/shared/frame.h"
 
 namespace vcp::f32 {
 
@@ -12,3 +14,16 @@ namespace vcp::f32 {
 #undef INLINE
 
 }  // namespace vcp::f32
+
+namespace vcp {
+
+/// Returns a light as FrameConstants::lightDirection has it, and its bits of the part of the light that is seen, as the
+/// shaders have them.
+inline glm::vec4 lightNumbered(const frame::FrameConstants& frame, uint32_t number) {
+    return number == 0 ? frame.lightDirection : frame.moreLights[number - 1];
+}
+inline uint8_t bitsOfLight(const frame::FrameConstants& frame, uint32_t number) {
+    return uint8_t(frame.lightCount == 1 ? 255 : 1 << number);
+}
+
+}  // namespace vcp

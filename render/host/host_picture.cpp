@@ -74,7 +74,7 @@ private:
         }
         std::fill_n(surface.sun, kTilePixels, 1.0f);
         std::fill_n(surface.sky, kTilePixels, 1.0f);
-        if (frame_.hasShadows != 0) castSun(hits, surface);
+        for (uint32_t i = 0; frame_.hasShadows != 0 && i < frame_.lightCount; ++i) castSun(hits, surface, i);
         if (planes_) {
             castSky(hits, surface);
             return keep(hits, surface);
@@ -99,19 +99,23 @@ private:
         return tiles_.above(pixel, double(hits.depth[i]) / layer_.scene.grid().cell, lift, surface.normal(i));
     }
 
-    void castSun(const TileHits& hits, TileSurface& surface) const {
-        const glm::vec3 light(frame_.lightDirection);
+    void castSun(const TileHits& hits, TileSurface& surface, uint32_t number) const {
+        const glm::vec3 light(lightNumbered(frame_, number));
+        const auto darken = [&, bits = bitsOfLight(frame_, number)](int i) {
+            surface.sun[i] = float(toByte(surface.sun[i]) & ~bits) / 255;
+        };
         LightRay rays[kTilePixels];
         int pixels[kTilePixels];
         size_t count = 0;
         forEachHit(hits, [&](glm::ivec2 pixel, int i) {
-            if (!(glm::dot(surface.normal(i), light) > 0)) return void(surface.sun[i] = 0);
+            if (!(glm::dot(surface.normal(i), light) > 0)) return darken(i);
             rays[count] = tiles_.lightRay(lifted(hits, surface, pixel, i), light, frame::kNoHit);
             pixels[count++] = i;
         });
         float distances[kTilePixels];
         castLightRays(layer_.scene, {rays, count}, distances, tiles_.lightMarks());
-        for (size_t k = 0; k < count; ++k) surface.sun[pixels[k]] = distances[k] < kNothing ? 0.0f : 1.0f;
+        for (size_t k = 0; k < count; ++k)
+            if (distances[k] < kNothing) darken(pixels[k]);
     }
 
     void castSky(const TileHits& hits, TileSurface& surface) const {

@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/packing.hpp>
 
+#include "render/host/hit_light.h"
 #include "render/host/hit_surface.h"
 #include "render/host/section_caps.h"
 
@@ -47,6 +49,15 @@ void LayerTiles::cast(TileHits& hits) const {
     castTile(layer_.scene, layer_.rays, hits);
     if (layer_.caps != Caps::None) castCaps(layer_.scene, layer_.rays, layer_.caps, hits, cameraMarks());
     if (layer_.marks != nullptr) markPages(hits);
+    if (layer_.frame.opacity < 1) fade(hits);
+}
+
+/// Leaves out hits of a dataset that is not there in all samples.
+void LayerTiles::fade(TileHits& hits) const {
+    forEachPixel(size_, hits.corner, [&](glm::ivec2 pixel, int i) {
+        if (f32::isFaded(layer_.frame.opacity, uint32_t(pixel.x), uint32_t(pixel.y), layer_.frame.sampleNumber))
+            hits.depth[i] = std::numeric_limits<float>::infinity();
+    });
 }
 
 LayerTiles::CellRay LayerTiles::rayOf(glm::ivec2 pixel) const {

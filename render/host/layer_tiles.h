@@ -73,6 +73,7 @@ private:
     /// Marks the page that a pixel's ray begins in: it may miss it and hit what is below.
     void markBegin(glm::ivec2 pixel) const;
     void markPages(const TileHits& hits) const;
+    void fade(TileHits& hits) const;
 
     const HostLayer& layer_;
     const glm::ivec2 size_;

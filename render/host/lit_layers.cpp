@@ -68,7 +68,9 @@ public:
         }
         // Light is computed in the world's axes.
         const glm::quat turn = lit_.front()->tiles.turn();
-        frame_.lightDirection = glm::vec4(turn * glm::vec3(frame_.lightDirection), 0);
+        const auto turned = [&](glm::vec4& light) { light = glm::vec4(turn * glm::vec3(light), light.w); };
+        turned(frame_.lightDirection);
+        for (glm::vec4& light : frame_.moreLights) turned(light);
         frame_.upDirection = glm::vec4(turn * glm::vec3(frame_.upDirection), 0);
     }
 
@@ -79,7 +81,7 @@ public:
             const LitTile tile = hitsOf(corner);
             if (tile.count == 0) return;
             for (size_t k = 0; k < tile.count; ++k) planes_.sun[tile.pixels[k].at] = 255;
-            if (frame_.hasShadows != 0) castSun(tile);
+            for (uint32_t i = 0; frame_.hasShadows != 0 && i < frame_.lightCount; ++i) castSun(tile, i);
             if (averagesSky)
                 castSky(tile);
             else
@@ -135,8 +137,10 @@ private:
         return each.tiles.lightRay(origin, each.fromWorld * direction, float(double(reach) / each.cell));
     }
 
-    void castSun(const LitTile& tile) {
-        const glm::vec3 light(frame_.lightDirection);
+    void castSun(const LitTile& tile, uint32_t number) {
+        const glm::vec3 light(lightNumbered(frame_, number));
+        const uint8_t bits = bitsOfLight(frame_, number);
+        const auto darken = [&](const LitTile::Pixel& pixel) { planes_.sun[pixel.at] &= uint8_t(~bits); };
         LightRay rays[kTilePixels];
         const LitTile::Pixel* from[kTilePixels];
         float distances[kTilePixels];
@@ -145,15 +149,15 @@ private:
             for (size_t k = 0; k < tile.count; ++k) {
                 const LitTile::Pixel& pixel = tile.pixels[k];
                 if (!(glm::dot(pixel.normal, light) > 0))
-                    planes_.sun[pixel.at] = 0;
-                else if (isMarking_ || planes_.sun[pixel.at] != 0) {
+                    darken(pixel);
+                else if (isMarking_ || (planes_.sun[pixel.at] & bits) != 0) {
                     rays[count] = lightRay(*each, pixel, light, frame::kNoHit);
                     from[count++] = &pixel;
                 }
             }
             castLightRays(each->layer.scene, {rays, count}, distances, each->tiles.lightMarks());
             for (size_t k = 0; k < count; ++k)
-                if (distances[k] < kNothing) planes_.sun[from[k]->at] = 0;
+                if (distances[k] < kNothing) darken(*from[k]);
         }
     }
 

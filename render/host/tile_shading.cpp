@@ -3,6 +3,7 @@
 
 #include <glm/geometric.hpp>
 
+#include "render/host/hit_light.h"
 #include "render/host/instruction_sets.h"
 
 #undef HWY_TARGET_INCLUDE
@@ -71,17 +72,35 @@ HWY_INLINE void storeColours(Lane3 colour, uint32_t* words) {
     hn::Store(hn::Or(rgb, hn::Set(Words(), 0xff000000u)), Words(), words);
 }
 
+/// Returns the light of all that is seen of them; `seen`: as TileSurface::sun.
+HWY_INLINE Lane sunlightOfAll(const frame::FrameConstants& frame, Lane3 n, Lane seen) {
+    Lane sum(0.0f);
+    const LaneWords bits = toByte(seen);
+    for (uint32_t i = 0; i < frame.lightCount; ++i) {
+        const glm::vec4 light = lightNumbered(frame, i);
+        const LaneWords own = hn::And(bits, hn::Set(Words(), 1u << i));
+        const Lane isSeen = hn::ConvertTo(Floats(), hn::BitCast(Integers(), own));
+        sum = sum + Lane(light.w / float(1u << i)) * sunlightOf(n, spread(glm::vec3(light)), isSeen);
+    }
+    return sum;
+}
+
 void shadeTileHere(const frame::FrameConstants& frame, const TileSurface& s, uint32_t* colours) {
     const Lane3 light = spread(glm::vec3(frame.lightDirection)), up = spread(glm::vec3(frame.upDirection));
     const Lane3 turn = spread(glm::vec3(frame.rotation));
     const Lane half(0.5f);
+    const bool isOne = frame.lightCount == 1 && frame.lightDirection.w == 1;
     for (int i = 0; i < kTilePixels; i += kLanes) {
         const Lane3 n(load(s.normalX + i), load(s.normalY + i), load(s.normalZ + i));
         Lane3 colour(load(s.red + i), load(s.green + i), load(s.blue + i));
         if (frame.shadingMode == frame::kShadeNormals)
             colour = half * turnedBy(turn, Lane(frame.rotation.w), n) + Lane3(half, half, half);
         else if (frame.shadingMode != frame::kShadeUnlit)
-            colour = encodedLight(n, light, up, load(s.sun + i), load(s.sky + i)) * colour;
+            colour =
+                encodedLight(n, up,
+                             isOne ? sunlightOf(n, light, load(s.sun + i)) : sunlightOfAll(frame, n, load(s.sun + i)),
+                             load(s.sky + i)) *
+                colour;
         storeColours(colour, colours + i);
     }
 }

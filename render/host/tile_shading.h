@@ -13,7 +13,8 @@ namespace vcp {
 struct TileSurface {
     alignas(32) float normalX[kTilePixels], normalY[kTilePixels], normalZ[kTilePixels];  ///< unit, towards the viewer
     alignas(32) float red[kTilePixels], green[kTilePixels], blue[kTilePixels];  ///< encoded for the screen, 0 to 1
-    alignas(32) float sun[kTilePixels], sky[kTilePixels];                       ///< how much of them is seen, 0 to 1
+    /// How much of them is seen, 0 to 1. Of several lights the sun's are bits, over 255 (hit_light.h).
+    alignas(32) float sun[kTilePixels], sky[kTilePixels];
 
     [[nodiscard]] glm::vec3 normal(int pixel) const { return {normalX[pixel], normalY[pixel], normalZ[pixel]}; }
 };

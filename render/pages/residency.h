@@ -1,61 +1,40 @@
-// Which pages of one dataset are in the pool: carries out what the policy (streaming/residency_policy.h) decides,
-// between the loader's threads and the pool: memory of the device, or the host's own.
-//
-// A page's life: wished for (PageLoader::request), read, written into a slot by update(), drawn while views want it,
-// evicted when its slot is needed. One update takes in a limited number of bytes, so that no frame waits for many
-// pages. All but the loader's reads runs in the caller's thread. Several views may share the pool, each with a number
-// of its own and a cut of its own; an update of one may change the others' cuts.
+// What views draw of one dataset among those that share a pool (scene_residency.h). Pages have the dataset's own
+// numbers here.
 #pragma once
 
-#include <algorithm>
-#include <array>
 #include <map>
 #include <memory>
-#include <unordered_map>
 #include <vector>
 
 #include "render/pages/page_memory.h"
 #include "render/pages/page_table.h"
 #include "render/pages/update_result.h"
-#include "streaming/page_loader.h"
 #include "streaming/residency_policy.h"
 
 namespace vcp {
 
-struct ResidencyOptions {
-    uint64_t budgetBytes = 512ull << 20;  ///< bytes of the pool
-    uint64_t uploadBytes = 16ull << 20;   ///< taken in by one update, half of it while a view moves; one page at least
-    LoadOrder order = LoadOrder::Feedback;
-    bool hiddenToo = false;  ///< views want what no ray hits, too
-    LoaderOptions loader;
-};
+class SceneResidency;
 
 class Residency {
 public:
-    /// Takes the pool from `memory`: never more than budgetBytes, and no more than the dataset can fill. Where there is
-    /// less memory, takes half of it, and so on. Errors: Device; Limit, where the coarsest page has no room.
-    static Result<std::unique_ptr<Residency>> create(const PageMemorySource& memory, const ResidencyOptions& options,
-                                                     std::shared_ptr<const Dataset> dataset,
-                                                     std::shared_ptr<const PageSource> source);
+    /// `scene` must outlive it.
+    Residency(SceneResidency& scene, size_t number, PooledDataset dataset)
+        : scene_(scene), number_(number), dataset_(std::move(dataset)) {}
 
-    /// Sets other budgets, from now on. Precondition: no frame is in flight. The pool is made anew without there ever
-    /// being more than one: pages go from the old one to the new through the memory that `ramBytes` allows, coarse ones
-    /// first; others are read again. Ends reads that are under way. Errors: Device; Limit, where the coarsest page
-    /// would have no room: nothing changes then.
-    Result<void> setBudgets(const PageMemorySource& memory, uint64_t budgetBytes, uint64_t ramBytes);
+    /// Among the datasets of its scene.
+    [[nodiscard]] size_t number() const { return number_; }
+    [[nodiscard]] SceneResidency& scene() { return scene_; }
 
-    /// After the device and all that was in it were lost: releases what there was of it, then begins anew on another.
-    void releasePool();
-    Result<void> rebuild(const PageMemorySource& memory);
-
-    /// Takes in pages; never waits for the loader. Copies wait for the frames in flight (page_memory.h). Errors:
-    /// Device.
-    Result<UpdateResult> update(const SelectionView& view, ViewNumber number = 0);
+    /// Takes what the view draws after the scene's update, and reports on it; what holds for all datasets is empty.
+    UpdateResult cutOf(const SelectionView& view, const DrawableCut& drawable, ViewNumber number);
+    /// The view does not show the dataset any more.
     void forgetView(ViewNumber number);
+    /// All that was in the pool is gone: all views are to be drawn again.
+    void forgetCuts() { cuts_.clear(); }
 
     /// Whether the rays' feedback would be used: pages are missing, and are read in the order that rays ask for them.
-    [[nodiscard]] bool listens() const { return listens_; }
-    void hear(const RayFeedback& feedback, const SelectionView& view) { policy_->hear(feedback, view); }
+    [[nodiscard]] bool listens() const;
+    void hear(const RayFeedback& feedback, const SelectionView& view);
 
     /// A number of what the view draws: frames of one cut have the same.
     [[nodiscard]] uint64_t cutNumber(ViewNumber number = 0) { return current(number).number; }
@@ -72,45 +51,26 @@ public:
     void surroundWith(uint64_t others, ViewNumber number = 0);
     [[nodiscard]] uint64_t others(ViewNumber number = 0) { return current(number).others; }
     /// Whether pages that rays ask for are there, or cannot be read.
-    [[nodiscard]] bool hasAll(const std::vector<uint64_t>& pages) const { return policy_->hasAll(pages); }
+    [[nodiscard]] bool hasAll(const std::vector<uint64_t>& pages) const;
 
-    /// Waits until the loader has a page, or the time is over.
-    bool waitForPage(std::chrono::milliseconds timeout) { return loader_->waitForPage(timeout); }
-
-    [[nodiscard]] const Dataset& dataset() const { return *dataset_; }
+    [[nodiscard]] const Dataset& dataset() const { return *dataset_.dataset; }
     /// The pages that the view can draw now, in directory order.
     [[nodiscard]] const std::vector<uint64_t>& cut(ViewNumber number = 0) { return current(number).pages; }
     /// Those of them that it draws only in some octants.
     [[nodiscard]] const std::vector<PartialPage>& partial(ViewNumber number = 0) { return current(number).partial; }
     [[nodiscard]] std::vector<frame::TableRecord> table(ViewNumber number = 0);
     /// A number that changes whenever the page table may: with another cut, or with pages in other places.
-    [[nodiscard]] uint64_t version() const { return policy_->version(); }
-    /// There is none after an error of setBudgets() or rebuild(): then only the destructor may be called.
-    [[nodiscard]] bool hasPool() const { return pool_ != nullptr; }
-    [[nodiscard]] const PageMemory& pages() const { return *pool_; }
+    [[nodiscard]] uint64_t version() const;
+    /// The pool, which holds the pages of all datasets of the scene.
+    [[nodiscard]] const PageMemory& pages() const;
     /// Returns the slot of a page that is resident.
-    [[nodiscard]] PoolSlot slotOf(uint64_t page) const { return policy_->slotOf(page); }
-    [[nodiscard]] bool hasColour() const { return options_.loader.withColour; }
-    template <class Visit>
-    void forEachResident(Visit&& visit) const {
-        policy_->forEachResident(visit);
-    }
-    /// Bytes of colour of the pages in the pool.
+    [[nodiscard]] PoolSlot slotOf(uint64_t page) const;
+    [[nodiscard]] bool hasColour() const { return dataset_.withColour; }
+    [[nodiscard]] std::vector<uint64_t> residentPages() const;
+    /// Bytes of colour of the dataset's pages in the pool.
     [[nodiscard]] uint64_t colourBytes() const;
 
 private:
-    explicit Residency(const ResidencyOptions& options) : options_(options) {}
-    struct CarriedPage {
-        uint64_t page = 0;
-        std::vector<std::byte> bytes;  // geometry followed by colour
-    };
-    Result<void> createPool(const PageMemorySource& memory);
-    void startLoader();
-    Result<std::vector<CarriedPage>> carryOut();
-    [[nodiscard]] bool hasRoomIn(PoolShape shape) const;
-    /// Returns a slot for the page, with pages moved out of its way; nothing where there is none.
-    Result<std::optional<PoolSlot>> slotFor(uint64_t page);
-    Result<void> place(uint64_t page, const PageBytes& bytes);
     struct ViewCut {
         std::vector<uint64_t> pages;
         std::vector<PartialPage> partial;
@@ -124,29 +84,13 @@ private:
     /// Returns what a view draws as pages are now.
     ViewCut& current(ViewNumber number);
     void take(DrawableCut drawable, ViewCut& cut);
-    /// Bytes that one update takes in, and that the loader reads before it.
-    [[nodiscard]] uint64_t uploadBytes() const {
-        return std::max<uint64_t>(1, policy_->isMoving() ? options_.uploadBytes / 2 : options_.uploadBytes);
-    }
-    UpdateResult report(const PolicyOutcome& outcome, const ViewCut& cut) const;
+    UpdateResult report(const DrawableCut& drawable, const ViewCut& drawn) const;
 
-    ResidencyOptions options_;
-    std::shared_ptr<const Dataset> dataset_;
-    std::unique_ptr<ResidencyPolicy> policy_;
-    std::unique_ptr<PageMemory> pool_;
-    std::shared_ptr<const PageSource> source_;
-    std::unique_ptr<PageLoader> loader_;
-    LoaderStats past_;  // counts of the loaders before this one
-    struct PageRoot {
-        PageHeader header;
-        std::array<uint32_t, 8> octants{};  // words of the root's octants, where it is an internal node
-    };
-    std::unordered_map<uint64_t, PageRoot> roots_;  // of pages that are or were resident
+    SceneResidency& scene_;
+    const size_t number_;
+    const PooledDataset dataset_;
     std::map<ViewNumber, ViewCut> cuts_;
-    uint64_t cutsDrawn_ = 0;         // number of the last cut
-    std::vector<Error> problems_;    // not reported yet
-    std::vector<Request> tooLarge_;  // given up because reading them takes more memory than there is
-    bool listens_ = false;
+    uint64_t cutsDrawn_ = 0;  // number of the last cut
 };
 
 }  // namespace vcp

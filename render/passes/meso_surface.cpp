@@ -154,6 +154,12 @@ MesoConstants MesoSurfacePass::constantsOf(const Placed& surface, PictureSize si
     c.view.strayPixels = float(look.errorPixels), c.view.farShadows = look.shadows ? 1 : 0;
     c.view.up = look.up;
     c.view.shows = uint32_t(look.shading);
+    c.view.sectionCount = uint32_t(look.sections.size());
+    for (size_t i = 0; i < look.sections.size(); ++i) {
+        const double length = glm::length(look.sections[i].normal);
+        const glm::dvec3 normal = look.sections[i].normal / length;
+        c.view.sections[i] = glm::dvec4(normal, glm::dot(normal, surface.origin) - look.sections[i].offset / length);
+    }
     return c;
 }
 

@@ -54,6 +54,7 @@ struct MesoLook {
     glm::dvec3 light{0.5, 0.4, 0.75};  ///< towards the light, unit
     glm::dvec3 up{0, 0, 1};            ///< direction of the sky, unit
     bool shadows = false;
+    std::vector<SectionPlane> sections;  ///< at most kMostSections
     MesoShading shading = MesoShading::Lit;
     double errorPixels =
         0.5;  ///< surfaces that stray less from their mean height are not marched (MesoSurface::far); 0: all are

@@ -34,7 +34,7 @@ layout(set = 0, binding = 8) uniform utextureBuffer tileStartTexels;
 layout(set = 0, binding = 9, std430) buffer TileListBlock { uint tileList[]; };
 layout(set = 0, binding = 10) uniform utextureBuffer tileListTexels;
 // A pixel's record: depth (float bits; negative on the cap of a section), normal (octahedral, 16 + 16 bits),
-// colour (RGBA8), and at frame.lightPlane light (8 bits sun, 8 bits sky) or the value of a false colour (float bits,
+// colour (RGBA8), and at frame.lightPlane light (8 bits sun, 8 bits sky; of several lights each has a bit of the sun's) or the value of a false colour (float bits,
 // 0 to 1); planes of width * height words.
 layout(set = 0, binding = 11, std430) buffer HitBlock { uint hits[]; };
 layout(set = 0, binding = 12) uniform utextureBuffer hitTexels;
@@ -42,6 +42,11 @@ layout(set = 0, binding = 13, std430) writeonly buffer PictureBlock { uint pictu
 layout(set = 0, binding = 14, std430) buffer CounterBlock { FrameCounters counters; };
 layout(set = 0, binding = 15, std430) buffer FeedbackBlock { uint feedback[]; };
 // clang-format on
+
+// A light as FrameConstants::lightDirection has it, and its bits of the part of the light that is seen: the one light
+// has all eight.
+vec4 lightNumbered(uint number) { return number == 0u ? frame.lightDirection : frame.moreLights[number - 1u]; }
+uint bitsOfLight(uint number) { return frame.lightCount == 1u ? 255u : 1u << number; }
 
 uvec2 pictureSize() { return uvec2(frame.width, frame.height); }
 

@@ -1,6 +1,5 @@
-// Traces the light that reaches each hit: one ray to the sun, and some into the sky above the surface. Reads pool,
-// table,
-// tile list and hits; writes the hits' plane of light.
+// Traces the light that reaches each hit: one ray to each light, and some into the sky above the surface. Reads pool,
+// table, tile list and hits; writes the hits' plane of light.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #include "render/shaders/bindings.glsl"
@@ -31,21 +30,22 @@ void main() {
 
     uint sky = frame.occlusionRays;
     float radius = frame.occlusionReach;
-    bool lit = dot(n, frame.lightDirection.xyz) > 0.0;
-    float sun = lit ? 1.0 : 0.0, open = 0.0;
+    uint suns = frame.hasShadows * frame.lightCount, seen = 255u;
+    float open = 0.0;
     Work work = Work(0u, 0u, 0u);
-    for (uint i = 1u - frame.hasShadows; i <= sky; i++) {
+    for (uint i = 0u; i < suns + sky; i++) {
+        bool isSun = i < suns;
         vec3 direction =
-            i == 0u ? frame.lightDirection.xyz : skyDirection(n, i - 1u, sky, pixel.x, pixel.y, frame.sampleNumber);
+            isSun ? lightNumbered(i).xyz : skyDirection(n, i - suns, sky, pixel.x, pixel.y, frame.sampleNumber);
+        bool lit = !isSun || dot(n, direction) > 0.0;
         ray.direction = withoutZeros(direction);
         ray.inverse = 1.0 / ray.direction;
-        float reach = min(i == 0u ? kNoHit : radius, keptInterval(ray).last);
-        bool needed = found && (i > 0u || lit);
-        Hit hit = castRay(ray, needed ? 0.0 : kNoHit, reach, work);
+        float reach = min(isSun ? kNoHit : radius, keptInterval(ray).last);
+        Hit hit = castRay(ray, found && lit ? 0.0 : kNoHit, reach, work);
         bool blocked = hit.depth < reach;
-        if (i == 0u && blocked) sun = 0.0;
-        if (i > 0u) open += blocked ? skyBehind(hit.depth / radius) : 1.0;
+        if (isSun && (blocked || !lit)) seen &= ~bitsOfLight(i);
+        if (!isSun) open += blocked ? skyBehind(hit.depth / radius) : 1.0;
     }
     float skyLight = sky == 0u ? 1.0 : open / float(sky);
-    if (found) hits[frame.lightPlane * plane + at] = packUnorm4x8(vec4(sun, skyLight, 0.0, 0.0));
+    if (found) hits[frame.lightPlane * plane + at] = packUnorm4x8(vec4(0.0, skyLight, 0.0, 0.0)) | seen;
 }

@@ -24,6 +24,9 @@ const float kPieceSlack = 2e-5, kRounding = 4e-7;
 // A ray looks at no more nodes and pieces, and makes no more iterations in all its pieces; then it is unresolved, with
 // what it found. A ray along a base of five million triangles, 1600 quads across, passes a tenth of that.
 const uint kMostVisits = 65536u;
+// A ray that begins in a section plane meets what is solid there in the piece that it begins in, or comes into within
+// this part of a pixel.
+const float kCutSlack = 0.05;
 const float kLeastSlope = 1.0 / 16.0;  // least slope of a ray to the slab: below it, textures are not blurred further
 
 struct ShellHit {
@@ -38,6 +41,9 @@ struct ShellHit {
 // A pixel's width in world units: at the start of its ray, and how much it grows along it.
 float widthAtStart, widthGrowth;
 float pixelWidth(float t) { return widthAtStart + widthGrowth * t; }
+
+// Where the ray begins in a section plane, the normal of what that cuts; else 0.
+vec3 cutNormal = vec3(0.0);
 
 // Gives a normal where the method has none: that of the nearest data, or of the voxel's face.
 vec3 fallbackNormal(vec3 p, vec3 d) {
@@ -126,6 +132,11 @@ void castPiece(Passage passage, vec3 o, vec3 d, float start, inout ShellHit best
         ray.isOutside = entered >= 0;
         vec3 cut = entered == 0 ? r0.xyz + r1.xyz + r2.xyz : entered == 1 ? -r0.xyz : entered == 2 ? -r1.xyz : -r2.xyz;
         bool far = kFromFar != 0u && isFar(t0, t1, t2, pixelWidth(start + passage.enter));
+        if (cutNormal != vec3(0.0) && start + passage.enter <= kCutSlack * pixelWidth(0.0)) {
+            // The ray begins in a section plane: what is solid there shows its cut.
+            fromCut = true;
+            cut = cutNormal;
+        }
         if (fromCut && (far ? ray.o.z < view.meanHeight : isSolidAt(ray.o))) {
             best = ShellHit(start + passage.enter, cut, best.iterations, best.unresolved, at, false);
             return;
@@ -233,6 +244,25 @@ vec4 lookAt(ShellHit hit, vec3 p, vec3 d, float width, inout vec3 n) {
     return look;
 }
 
+// The part of a ray that section planes leave.
+struct KeptPart {
+    float first, last;
+};
+KeptPart keptPart(vec3 o, vec3 d) {
+    KeptPart kept = KeptPart(0.0, kMesoNoHit);
+    for (uint i = 0u; i < view.sectionCount; i++) {
+        vec4 plane = view.sections[i];
+        float above = dot(plane.xyz, o) + plane.w, climb = dot(plane.xyz, d);
+        if (climb > 0.0 && -above > climb * kept.first) {
+            kept.first = -above / climb;
+            cutNormal = -plane.xyz;
+        }
+        if (climb < 0.0) kept.last = min(kept.last, -above / climb);
+        if (climb == 0.0 && above < 0.0) kept.last = -1.0;
+    }
+    return kept;
+}
+
 void main() {
     uvec2 pixel = gl_GlobalInvocationID.xy;
     if (pixel.x >= view.width || pixel.y >= view.height) return;
@@ -252,20 +282,28 @@ void main() {
         widthAtStart = pixelWidth(depth);
         widthGrowth = 0.0;
         vec3 from = eye + depth * d + view.shadowLift * n;
-        ShellHit hit = castShell(from, view.light, kMesoNoHit);
+        KeptPart kept = keptPart(from, view.light);
+        float reach = kept.last - kept.first;
+        if (reach <= 0.0) return;
+        ShellHit hit = castShell(from + kept.first * view.light, view.light, reach);
         if (hit.unresolved) atomicAdd(counters[0], 1u);
-        if (hit.t < kMesoNoHit) hits[kMesoPlaneLook * plane + index] = colour & 0xffffffu;
+        if (hit.t < reach) hits[kMesoPlaneLook * plane + index] = colour & 0xffffffu;
         return;
     }
-    ShellHit hit = castShell(eye, d, depth);
+    KeptPart kept = keptPart(eye, d);
+    float reach = min(depth, kept.last) - kept.first;
+    if (reach <= 0.0) return;
+    eye += kept.first * d;
+    widthAtStart += widthGrowth * kept.first;
+    ShellHit hit = castShell(eye, d, reach);
     hits[kMesoPlaneIterations * plane + index] += hit.iterations;
     if (hit.unresolved) atomicAdd(counters[0], 1u);
-    if (!(hit.t < depth)) return;
+    if (!(hit.t < reach)) return;
     if (hit.far) atomicAdd(counters[1], 1u);
     vec3 n = normalize(hit.normal);
     vec4 look = lookAt(hit, eye + hit.t * d, d, pixelWidth(hit.t), n);
     if (dot(n, d) > 0.0) n -= dot(n, d) * d;
-    hits[kMesoPlaneDepth * plane + index] = floatBitsToUint(hit.t);
+    hits[kMesoPlaneDepth * plane + index] = floatBitsToUint(kept.first + hit.t);
     // 0 means that a pixel has no mesostructure.
     hits[kMesoPlaneNormal * plane + index] = max(packHitNormal(normalize(n)), 1u);
     hits[kMesoPlaneLook * plane + index] = packUnorm4x8(look);

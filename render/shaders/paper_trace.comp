@@ -8,6 +8,7 @@
 #include "render/shaders/tiles.glsl"
 #include "render/shaders/sections.glsl"
 #include "render/shaders/hit_records.glsl"
+#include "render/shared/hit_light.h"
 
 layout(constant_id = 6) const uint kSections = 0u;  // 1: planes cut
 layout(constant_id = 7) const uint kScheme = 2u;    // PaperScheme
@@ -39,6 +40,7 @@ void main() {
     if (kSections != 0u) kept = keptInterval(ray);
     PaperHit hit = castPaper(ray, page, kept.first, kept.last, work);
 
+    if (frame.opacity < 1.0 && isFaded(frame.opacity, pixel.x, pixel.y, frame.sampleNumber)) hit.depth = kNoHit;
     bool found = hit.depth < kNoHit;
     hit.normal *= inversesqrt(max(dot(hit.normal, hit.normal), 1e-30));
     hit.normal -= max(dot(hit.normal, ray.direction), 0.0) * ray.direction;

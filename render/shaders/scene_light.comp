@@ -37,25 +37,27 @@ void main() {
     if (depth >= kNoHit) return;
     vec3 n = unpackHitNormal(sceneLight[sceneAt(kSceneNormal, at)]);
     float lift = uintBitsToFloat(sceneLight[sceneAt(kSceneLift, at)]);
-    vec3 sun = turnedBy(frame.rotation.xyz, frame.rotation.w, frame.lightDirection.xyz);
-    bool isSun = light.number == kSunRay, lit = dot(n, sun) > 0.0;
+    bool isSun = light.number > kSunRay - kMaxLights;
+    uint number = isSun ? kSunRay - light.number : 0u, bits = bitsOfLight(number);
+    vec3 sun = turnedBy(frame.rotation.xyz, frame.rotation.w, lightNumbered(number).xyz);
+    bool lit = dot(n, sun) > 0.0;
     uint sky = frame.occlusionRays, lightAt = sceneAt(kSceneLight, at), nearAt = sceneAt(kSceneNear, at);
 
     // Where pages are marked, each ray goes through each dataset.
     bool marks = frame.firstHitMark != 0u;
     float near = isSun || light.isFirst != 0u ? kNoHit : uintBitsToFloat(sceneLight[nearAt]);
-    uint seen = isSun && light.isFirst != 0u && sky == 0u ? packUnorm4x8(vec4(lit ? 1.0 : 0.0, 1.0, 0.0, 0.0))
-                                                          : sceneLight[lightAt];
+    bool isFirstOfAll = light.number == kSunRay && light.isFirst != 0u && sky == 0u;
+    uint seen = isFirstOfAll ? packUnorm4x8(vec4(1.0, 1.0, 0.0, 0.0)) : sceneLight[lightAt];
     vec3 direction = isSun ? sun : skyDirection(n, light.number, sky, pixel.x, pixel.y, frame.sampleNumber);
     Ray ray = lightRay(pixel, depth, lift, n, direction);
     float radius = isSun ? kNoHit : marks ? frame.occlusionReach : min(frame.occlusionReach, near / frame.worldPerCell);
     float reach = min(radius, keptInterval(ray).last);
-    bool needed = !isSun || (lit && (marks || (seen & 255u) != 0u));
+    bool needed = !isSun || (lit && (marks || (seen & bits) != 0u));
     Work work = Work(0u, 0u, 0u);
     Hit hit = castRay(ray, needed ? 0.0 : kNoHit, reach, work);
     bool blocked = hit.depth < reach;
     if (isSun) {
-        sceneLight[lightAt] = blocked ? seen & ~255u : seen;
+        sceneLight[lightAt] = blocked || !lit ? seen & ~bits : seen;
         return;
     }
     if (blocked) near = min(near, hit.depth * frame.worldPerCell);
@@ -66,7 +68,6 @@ void main() {
     // The sum over the rays becomes light with the last one.
     float part = near / (frame.occlusionReach * frame.worldPerCell);
     float open = (light.number == 0u ? 0.0 : uintBitsToFloat(seen)) + (part < 1.0 ? skyBehind(part) : 1.0);
-    float sunSeen = frame.hasShadows != 0u && !lit ? 0.0 : 1.0;
     sceneLight[lightAt] =
-        light.number + 1u < sky ? floatBitsToUint(open) : packUnorm4x8(vec4(sunSeen, open / float(sky), 0.0, 0.0));
+        light.number + 1u < sky ? floatBitsToUint(open) : packUnorm4x8(vec4(1.0, open / float(sky), 0.0, 0.0));
 }

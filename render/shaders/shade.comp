@@ -44,6 +44,18 @@ float sceneSkyAbout(uvec2 pixel, float depth) {
     return sum / max(count, 1.0);
 }
 
+// Returns the light of all that is seen of them.
+float sunlightOfAll(vec3 n, uint seen) {
+    float sum = sunlightOf(n, frame.lightDirection.xyz, float(seen & 1u));
+    if (frame.lightCount == 1u && frame.lightDirection.w == 1.0) return sum;
+    sum *= frame.lightDirection.w;
+    for (uint i = 1u; i < frame.lightCount; i++) {
+        vec4 light = lightNumbered(i);
+        sum += light.w * sunlightOf(n, light.xyz, float(seen >> i & 1u));
+    }
+    return sum;
+}
+
 void main() {
     uvec2 pixel;
     uint tile;
@@ -64,20 +76,21 @@ void main() {
     vec3 albedo = frame.clay.xyz;
     if (kColour != 0u && coloured) albedo = unpackUnorm4x8(fetchHit(2u * plane + at)).xyz;
     if (hit.onCap) albedo = frame.cap.xyz;
-    float sunSeen = 1.0, skySeen = 1.0;
+    float skySeen = 1.0;
+    uint seen = 255u;
     if (kLight == 1u) {
-        sunSeen = unpackUnorm4x8(fetchHit(frame.lightPlane * plane + at)).x;
+        seen = fetchHit(frame.lightPlane * plane + at) & 255u;
         if (frame.occlusionRays > 0u) skySeen = skyAbout(pixel, depth, plane);
     }
     if (kLight == 2u) {
         if (depth * frame.worldPerCell != sceneDepth(at)) return;
-        if (frame.hasShadows != 0u) sunSeen = unpackUnorm4x8(sceneLight[sceneAt(kSceneLight, at)]).x;
+        if (frame.hasShadows != 0u) seen = sceneLight[sceneAt(kSceneLight, at)] & 255u;
         if (frame.occlusionRays > 0u) skySeen = sceneSkyAbout(pixel, sceneDepth(at));
     }
     vec3 colour = frame.shadingMode == kShadeNormals ? turnedBy(frame.rotation.xyz, frame.rotation.w, n) * 0.5 + 0.5
                   : frame.shadingMode == kShadeUnlit
                       ? albedo
-                      : albedo * encodedLight(n, frame.lightDirection.xyz, frame.upDirection.xyz, sunSeen, skySeen);
+                      : albedo * encodedLight(n, frame.upDirection.xyz, sunlightOfAll(n, seen), skySeen);
     if (kLight == 2u)
         targetPixels[at] = packUnorm4x8(vec4(colour, 1.0));
     else

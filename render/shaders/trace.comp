@@ -11,6 +11,7 @@ const uint kHitBy = kHitByCamera;
 #include "render/shaders/cast.glsl"
 #include "render/shaders/sections.glsl"
 #include "render/shaders/hit_records.glsl"
+#include "render/shared/hit_light.h"
 
 layout(constant_id = 6) const uint kSections =
     0u;  // 0: none; 1: planes that cut; 2: with filled caps; 3: of closed parts
@@ -172,6 +173,7 @@ void main() {
         if (onCap) surface.normal = kept.plane;
     }
 
+    if (frame.opacity < 1.0 && isFaded(frame.opacity, pixel.x, pixel.y, frame.sampleNumber)) hit.depth = kNoHit;
     bool found = hit.depth < kNoHit;
     // A blended normal may lean away from the ray near a silhouette: it is bent back to it.
     vec3 normal = surface.normal * inversesqrt(max(dot(surface.normal, surface.normal), 1e-30));

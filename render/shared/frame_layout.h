@@ -31,6 +31,8 @@ const float kMostShownCells = 16.0f;
 const float kMostShownFetches = 128.0f;
 
 const uint kMaxSections = 6u;
+const uint kMaxLights = 4u;
+const uint kMaxMoreLights = 3u;
 
 struct FrameConstants {
     // Ray of the picture's point x, y (pixels): origin + x originX + y originY, in finest cells relative to
@@ -45,7 +47,7 @@ struct FrameConstants {
     uint finestLevel;
     uint stripes;  // of the tile list: see stripedIndex in tiles.glsl
     uint shadingMode;
-    vec4 lightDirection;                 // unit, world axes, towards the light
+    vec4 lightDirection;                 // unit, world axes, towards the first light; w: its strength
     vec4 upDirection;                    // unit: where the hemisphere's light comes from
     vec4 clay;                           // encoded for the screen
     vec4 cap;                            // colour of cut solids, encoded for the screen
@@ -65,6 +67,10 @@ struct FrameConstants {
     uint partRow, partRows, skippedRows;
     uint firstHitMark;  // word of the feedback buffer with the first mark of a page that was hit; 0: there are none
     vec4 rotation;      // quaternion: world from the dataset's axes
+    uint lightCount;
+    float opacity;  // part of the samples in which the dataset is there
+    uint unused0, unused1;
+    vec4 moreLights[kMaxMoreLights];  // the other lights, as lightDirection
     // What has dot(xyz, p) + w >= 0 is kept; p in finest cells relative to originLattice.
     vec4 sections[kMaxSections];
 };
@@ -131,12 +137,12 @@ struct SceneRay {
     uint isFirst, isLast;  // 1: of the datasets that the ray goes through
     uint unused;
 };
-const uint kSunRay = 0xffffffffu;
+const uint kSunRay = 0xffffffffu;  // of the first light; those of the others have the numbers below
 
 // Planes of a picture of several datasets that shade each other, words: the packed normal in the world's axes
 // (hit_records.glsl), by how many world units rays of light begin above the hit (float bits), light (8 bits sun, 8 bits
-// sky; before the last ray into the sky the sum of what these see, float bits), and where the ray that is being cast
-// was stopped (float bits; world units).
+// sky, as shade.comp has them; before the last ray into the sky the sum of what these see, float bits), and where the
+// ray that is being cast was stopped (float bits; world units).
 const uint kSceneNormal = 0u;
 const uint kSceneLift = 1u;
 const uint kSceneLight = 2u;

@@ -4,13 +4,18 @@
 
 // Returns the light that falls on a surface, encoded for the screen. A power of a product is the product of the powers:
 // colours come encoded, so that one power a pixel is enough.
-INLINE Real encodedLight(Real3 n, Real3 light, Real3 up, Real sunSeen, Real skySeen) {
-    Real sun = max(dot(n, light), Real(0.0));
+// `sunlight`: sunlightOf, of all lights together.
+INLINE Real encodedLight(Real3 n, Real3 up, Real sunlight, Real skySeen) {
     Real sky = Real(0.5) + Real(0.5) * dot(n, up);
     // Hollows are darker than the sun alone would have them: they see less of what it lights.
-    return pow(
-        Real(0.72) * sun * sunSeen * (Real(0.5) + Real(0.5) * skySeen) + (Real(0.10) + Real(0.18) * sky) * skySeen,
-        Real(1.0 / 2.2));
+    return pow(sunlight * (Real(0.5) + Real(0.5) * skySeen) + (Real(0.10) + Real(0.18) * sky) * skySeen,
+               Real(1.0 / 2.2));
+}
+
+// Returns what a light of strength 1 gives, where a part of it is seen.
+INLINE Real sunlightOf(Real3 n, Real3 light, Real sunSeen) {
+    Real sun = max(dot(n, light), Real(0.0));
+    return Real(0.72) * sun * sunSeen;
 }
 
 // Turns a normal by a quaternion: from the dataset's own axes to the world's.
@@ -36,6 +41,14 @@ INLINE Real3 skyDirection(Real3 n, uint i, uint count, uint x, uint y, uint samp
     Real3 side = normalize(abs(n.z) < 0.7f ? Real3(n.y, -n.x, 0.0f) : Real3(0.0f, n.z, -n.y));
     float r = sqrt(radius2);
     return r * cos(angle) * side + r * sin(angle) * cross(n, side) + sqrt(1.0f - radius2) * n;
+}
+
+// Whether a surface that is there in a part of a pixel's samples is left out of this one. Over 16 samples a pixel
+// leaves it out in as many as its opacity says, to a sixteenth; over a square of 4 x 4 pixels so does each sample.
+INLINE bool isFaded(float opacity, uint x, uint y, uint sampleNumber) {
+    uint square = (x & 3u) | (y & 3u) << 2;
+    uint step = (square * 7u + 5u * sampleNumber) & 15u;
+    return (float(step) + 0.5f) / 16.0f >= opacity;
 }
 
 // Returns what an occlusion ray sees of the sky, where it is blocked at a part of its reach: less, the nearer.

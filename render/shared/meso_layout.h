@@ -17,6 +17,8 @@ const float kMesoNoHit = 1e30f;  // from here on, a depth is none
 const uint kMesoPlaneDepth = 0u, kMesoPlaneNormal = 1u, kMesoPlaneLook = 2u, kMesoPlaneIterations = 3u;
 const uint kMesoPlanes = 4u;
 
+const uint kMesoMaxSections = 6u;
+
 // A texture over the tile, with its smaller levels.
 struct MesoImage {
     uint first;  // texel
@@ -40,5 +42,6 @@ struct MesoView {
     float strayPixels;  // that a surface may stray from its mean height and not be marched
     float meanHeight;   // tile units
     uint farShadows;    // 1: what is seen from far has the shadows of the mesostructure on itself
-    uint unused1;
+    uint sectionCount;
+    vec4 sections[kMesoMaxSections];  // as FrameConstants::sections, in world units from the shell's origin
 };

@@ -66,11 +66,10 @@ Result<void> Renderer::setBudgets(uint64_t budgetBytes, uint64_t ramBytes) {
     Shared& s = *view_->shared;
     if (!s.device) return kGone;
     VCP_TRY(checkBudget(budgetBytes));
+    VCP_TRY_ASSIGN(const auto pageBytes, s.pageBudget(budgetBytes));
     if (!s.datasets.empty()) {
         s.hidePool();
-        const auto done = s.setShares(budgetBytes, ramBytes);
-        // Some datasets may have their new share by now.
-        if (!done && s.datasets.size() > 1) static_cast<void>(s.setShares(s.options.budgetBytes, s.options.ramBytes));
+        const auto done = sceneOf(s.datasets)->setBudgets(poolsOf(*s.device, s.access), pageBytes, ramBytes);
         VCP_TRY(s.showPool());
         if (!done) return done;
     }
@@ -83,6 +82,7 @@ Result<void> Renderer::setSurfaces(std::span<const MesoSurface> surfaces) {
     Shared& s = *view_->shared;
     if (!s.device) return kGone;
     VCP_TRY(s.device->waitForAll());
+    const uint64_t before = s.surfaceBytes();
     for (View* view : s.views) view->forgetFrames();
     ++s.mesoVersion;
     if (surfaces.empty()) {
@@ -93,7 +93,12 @@ Result<void> Renderer::setSurfaces(std::span<const MesoSurface> surfaces) {
     }
     const auto done = s.uploadSurfaces();
     for (View* view : s.views) VCP_TRY(view->makeLayers());
-    return done;
+    if (!done || s.datasets.empty() || s.surfaceBytes() == before) return done;
+    const auto left = setBudgets(s.options.budgetBytes, s.options.ramBytes);
+    if (left) return left;
+    s.meso.reset();
+    for (View* view : s.views) VCP_TRY(view->makeLayers());
+    return left;
 }
 
 void Renderer::close() {

@@ -66,9 +66,9 @@ public:
 
     /// Shows a dataset, in all views, in place of the one before. Its pages come from `source` in loader threads.
     Result<void> open(std::shared_ptr<const Dataset> dataset, std::shared_ptr<const PageSource> source);
-    /// Shows several datasets, each drawn by itself, and the nearest surface is seen; shadows and occlusion act within
-    /// each dataset. Budgets are shared out (budgetShares). `surfaces`: as in setSurfaces. Errors: those of open for
-    /// one dataset and of setSurfaces; then nothing is shown.
+    /// Shows several datasets, each drawn by itself, and the nearest surface is seen; they shade each other. They share
+    /// the budgets, which go to what is seen, whichever dataset it is of. `surfaces`: as in setSurfaces. Errors: those
+    /// of open for one dataset and of setSurfaces; then nothing is shown.
     Result<void> open(std::vector<PlacedDataset> datasets, std::span<const MesoSurface> surfaces = {}) override;
     /// Stops the loader and forgets all pages.
     void close();
@@ -76,9 +76,10 @@ public:
     /// Shows surfaces with mesostructure, in all views, in place of those before. They are drawn over the open
     /// datasets; the nearer surface is seen at each pixel. They take light, shadows, normals, unlit colours and steps
     /// (their iterations, 0 to 100) from the request; a surface that strays less than the request's errorPixels from
-    /// its mean height is shown by its light from far. They and the datasets cast no shadow on each other, and no
-    /// section plane cuts them. The renderer keeps them to upload them again to a device that is made anew. Without
-    /// any, nothing is made for them. After an error there are none. Errors: Device, Limit.
+    /// its mean height is shown by its light from far. Section planes cut them; they and the datasets cast no shadow on
+    /// each other. Their bytes are taken from the budget of the pool. The renderer keeps them to upload them again to a
+    /// device that is made anew. Without any, nothing is made for them. After an error there are none. Errors: Device,
+    /// Limit.
     Result<void> setSurfaces(std::span<const MesoSurface> surfaces) override;
 
     /// Sets other budgets than the options', from now on: pages without room go at once, and kept pages are not read

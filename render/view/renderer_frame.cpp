@@ -38,13 +38,10 @@ MesoLook mesoLook(const FrameRequest& request) {
     const PictureTile tile = wholePicture(request);
     const LightDirections directions =
         lightDirections(request, cameraBasis(request.camera, tile.fullWidth, tile.fullHeight));
-    return {request.camera,
-            tile,
-            upperLeft(request),
-            directions.light,
-            directions.sky,
-            request.shading.shadows,
-            mesoShading(request.shading.mode),
+    return {request.camera,     tile,
+            upperLeft(request), directions.light,
+            directions.sky,     request.shading.shadows,
+            request.sections,   mesoShading(request.shading.mode),
             request.errorPixels};
 }
 
@@ -249,7 +246,7 @@ Result<void> Renderer::View::recordSurfaces(VkCommandBuffer commands, Frame& fra
 }
 
 FrameRequest Renderer::View::Layer::drawable(const FrameRequest& wanted) const {
-    FrameRequest request = requestIn(placement, wanted);
+    FrameRequest request = requestIn(placement, requestOfLook(wanted, number));
     if (!isPaper()) return request;
     request.beam = request.shading.shadows = false;
     request.sectionCaps = Caps::None;
@@ -398,7 +395,8 @@ std::vector<FrameStep> Renderer::View::litStepsOf(const FrameRequest& request) c
             steps.push_back({FrameStep::Pass::SceneLight, i, 1, {ray, i == casters.front(), i == casters.back(), 0}});
     };
     for (uint32_t ray = 0; ray < request.shading.occlusionRays; ++ray) addRay(ray);
-    if (request.shading.shadows) addRay(frame::kSunRay);
+    const auto lights = uint32_t(1 + request.shading.moreLights.size());
+    for (uint32_t light = 0; request.shading.shadows && light < lights; ++light) addRay(frame::kSunRay - light);
     for (size_t i = layers.size(); i-- > 0;) steps.push_back({FrameStep::Pass::Shade, i, 0});
     return steps;
 }
@@ -503,7 +501,7 @@ void Renderer::View::addKnownStats(Frame& frame) const {
         Residency* const residency = layers[i].residency;
         if (residency == nullptr) continue;
         frame.stats.colourBytes += residency->colourBytes();
-        frame.stats.poolBytes += residency->pages().bytes();
+        frame.stats.poolBytes = residency->pages().bytes();  // of all datasets
         frame.stats.pagesInCut += uint32_t(residency->cut(number).size());
     }
     frame.stats.feedbackPasses = shared->feedback.passes();

@@ -242,7 +242,7 @@ std::vector<PageBox> Renderer::residentPages() const {
         if (layer.residency == nullptr) continue;
         const Dataset& dataset = layer.residency->dataset();
         const std::vector<uint64_t>& cut = layer.residency->cut(view_->number);
-        layer.residency->forEachResident([&](uint64_t page) {
+        for (const uint64_t page : layer.residency->residentPages()) {
             const PageEntry& entry = dataset.pages[page];
             const glm::dvec3 low = dataset.originOf(entry);
             const double edge = dataset.edgeOf(entry) * layer.placement.scale;
@@ -255,7 +255,7 @@ std::vector<PageBox> Renderer::residentPages() const {
                 box.edges[size_t(axis)] = layer.placement.rotation * along;
             }
             boxes.push_back(box);
-        });
+        }
     }
     return boxes;
 }

@@ -39,25 +39,24 @@ Result<void> Renderer::Shared::uploadSurfaces() {
     return done;
 }
 
-Result<void> Renderer::Shared::addDatasets(std::vector<PlacedDataset> placed) {
-    VCP_TRY_ASSIGN(auto opened, openResidencies(poolsOf(*device, access), options, std::move(placed)));
-    std::move(opened.begin(), opened.end(), std::back_inserter(datasets));
-    return showPool();
+Result<uint64_t> Renderer::Shared::pageBudget(uint64_t budgetBytes) const {
+    const uint64_t taken = surfaceBytes();
+    if (taken == 0) return budgetBytes;
+    const uint64_t left = budgetBytes > taken ? budgetBytes - taken : 0;
+    if (checkBudget(left)) return left;
+    return Error{.code = ErrorCode::Limit,
+                 .message = fmt::format("surfaces with mesostructure take {} bytes, and a budget of {} leaves too few "
+                                        "for the datasets beside them: allow more",
+                                        taken, budgetBytes)};
 }
 
-Result<void> Renderer::Shared::setShares(uint64_t budgetBytes, uint64_t ramBytes) {
-    std::vector<uint64_t> bytes;
-    for (const PlacedResidency& placed : datasets)
-        bytes.push_back(largestPoolBytes(placed.residency->dataset(), placed.residency->hasColour()));
-    const std::vector<uint64_t> shares = budgetShares(budgetBytes, bytes);
-    // Pools that shrink are changed first, so that all together never exceed the budget.
-    for (const bool shrinks : {true, false})
-        for (size_t i = 0; i < datasets.size(); ++i) {
-            Residency& residency = *datasets[i].residency;
-            if ((residency.hasPool() && residency.pages().bytes() > shares[i]) != shrinks) continue;
-            VCP_TRY(residency.setBudgets(poolsOf(*device, access), shares[i], ramBytes / datasets.size()));
-        }
-    return {};
+Result<void> Renderer::Shared::addDatasets(std::vector<PlacedDataset> placed) {
+    if (placed.empty()) return showPool();
+    RendererOptions left = options;
+    VCP_TRY_ASSIGN(left.budgetBytes, pageBudget(options.budgetBytes));
+    VCP_TRY_ASSIGN(auto opened, openResidencies(poolsOf(*device, access), left, std::move(placed)));
+    std::move(opened.begin(), opened.end(), std::back_inserter(datasets));
+    return showPool();
 }
 
 void Renderer::Shared::hidePool() {
@@ -73,13 +72,12 @@ void Renderer::Shared::hidePool() {
 
 Result<void> Renderer::Shared::showPool() {
     static_cast<void>(device->takeOutOfMemory());  // a pool that was halved for it is fine
-    if (std::any_of(datasets.begin(), datasets.end(),
-                    [](const PlacedResidency& each) { return !each.residency->hasPool(); }))
-        datasets.clear();
-    std::vector<std::pair<uint32_t, uint32_t>> layouts;
-    for (const PlacedResidency& each : datasets)
-        layouts.emplace_back(poolOf(*each.residency).chunks(), poolOf(*each.residency).chunkShift());
-    if (!layouts.empty() && layouts != std::exchange(poolLayouts, layouts)) clearPipelines();
+    if (const SceneResidency* const scene = sceneOf(datasets); scene != nullptr && !scene->hasPool()) datasets.clear();
+    if (!datasets.empty()) {
+        const PagePool& pool = poolOf(*datasets.front().residency);
+        const std::pair layout(pool.chunks(), pool.chunkShift());
+        if (layout != std::exchange(poolLayout, layout)) clearPipelines();
+    }
     for (View* view : views) VCP_TRY(view->showDatasets());
     return {};
 }
@@ -100,7 +98,8 @@ void Renderer::Shared::clearPipelines() {
 Result<void> Renderer::Shared::rebuild(View& asked) {
     ++losses;
     for (View* view : views) view->release();
-    for (const PlacedResidency& placed : datasets) placed.residency->releasePool();
+    SceneResidency* const scene = sceneOf(datasets);
+    if (scene != nullptr) scene->releasePool();
     clearPipelines();
     if (meso) *meso = {.surfaces = std::move(meso->surfaces)};
     device.reset();
@@ -114,8 +113,7 @@ Result<void> Renderer::Shared::rebuild(View& asked) {
     for (View* view : views)
         if (view != first) VCP_TRY(view->attachToDevice());
     Result<void> done = uploadSurfaces();
-    for (const PlacedResidency& placed : datasets)
-        if (done) done = placed.residency->rebuild(poolsOf(*device, access));
+    if (done && scene != nullptr) done = scene->rebuild(poolsOf(*device, access));
     VCP_TRY(showPool());
     return done;
 }
@@ -125,16 +123,12 @@ bool Renderer::Shared::recover(View& asked, bool mayRebuild) {
     if (device->isLost()) return mayRebuild && rebuild(asked).ok();
     if (!device->takeOutOfMemory() || datasets.empty()) return false;
     hidePool();
-    // A dataset whose coarsest page has all of its pool already stays as it is.
-    bool halved = false;
-    for (const PlacedResidency& placed : datasets) {
-        if (!placed.residency->hasPool()) continue;
-        const auto done = placed.residency->setBudgets(poolsOf(*device, access), placed.residency->pages().bytes() / 2,
-                                                       options.ramBytes / datasets.size());
-        if (!done && done.error().code != ErrorCode::Limit) return false;
-        halved = halved || done.ok();
-    }
-    return showPool().ok() && halved;
+    SceneResidency& scene = *sceneOf(datasets);
+    if (!scene.hasPool()) return false;
+    // A pool that the coarsest pages fill stays as it is.
+    const auto done = scene.setBudgets(poolsOf(*device, access), scene.pages().bytes() / 2, options.ramBytes);
+    if (!done && done.error().code != ErrorCode::Limit) return false;
+    return showPool().ok() && done.ok();
 }
 
 }  // namespace vcp

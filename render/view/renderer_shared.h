@@ -31,7 +31,7 @@ struct Renderer::Shared {
     PageAccess access = PageAccess::TexelBuffer;
     uint32_t stripes = 1;
     std::vector<PlacedResidency> datasets;
-    std::vector<std::pair<uint32_t, uint32_t>> poolLayouts;  // layouts of the datasets that the pipelines were made for
+    std::pair<uint32_t, uint32_t> poolLayout;  // chunks and their shift, which the pipelines were made for
     uint32_t losses = 0;
     // Views record their frames one after the other, so one set of pipelines is enough for all.
     BeamPass beam;
@@ -60,6 +60,10 @@ struct Renderer::Shared {
     void take(std::unique_ptr<Device> made);
     /// Uploads the copies of the surfaces to the device. After an error there are none.
     Result<void> uploadSurfaces();
+    /// Bytes of the surfaces, which the budget pays for before pages.
+    [[nodiscard]] uint64_t surfaceBytes() const { return meso && meso->pass ? meso->pass->assetBytes() : 0; }
+    /// Returns what the surfaces leave of a budget for pages. Errors: Limit, where that is too little.
+    Result<uint64_t> pageBudget(uint64_t budgetBytes) const;
     /// Opens datasets beside those that are open, and shows all. After an error none is added. Errors: as of
     /// Renderer::open.
     Result<void> addDatasets(std::vector<PlacedDataset> placed);
@@ -68,8 +72,6 @@ struct Renderer::Shared {
     void hidePool();
     Result<void> showPool();
     void clearPipelines();
-    /// Shares the budgets out among the datasets.
-    Result<void> setShares(uint64_t budgetBytes, uint64_t ramBytes);
     /// Makes anew all that the device held. `asked`: the view that found the device lost.
     Result<void> rebuild(View& asked);
     /// Whether what failed is worth another try now.

@@ -17,7 +17,7 @@ Renderer::View::View(std::shared_ptr<Shared> with, std::optional<SurfaceSource> 
 Renderer::View::~View() {
     if (shared->device) static_cast<void>(shared->device->waitForAll());
     std::erase(shared->views, this);
-    for (const PlacedResidency& placed : shared->datasets) placed.residency->forgetView(number);
+    if (SceneResidency* const scene = sceneOf(shared->datasets)) scene->forgetView(number);
 }
 
 Result<VkSurfaceKHR> Renderer::View::createSurface() const {
@@ -102,6 +102,7 @@ Result<void> Renderer::View::showDatasets() {
     const std::vector<PlacedResidency>& datasets = shared->datasets;
     for (size_t i = 0; i < layers.size(); ++i) {
         layers[i].dataset = layers[i].residency = i < datasets.size() ? datasets[i].residency.get() : nullptr;
+        layers[i].number = i;
         layers[i].placement = i < datasets.size() ? datasets[i].placement : Similarity{};
         layers[i].tableStale = true;
     }

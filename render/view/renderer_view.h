@@ -50,6 +50,7 @@ struct Renderer::View {
         Residency* dataset = nullptr;    // null: none is open
         Residency* residency = nullptr;  // the same; null where it is hidden: nothing but the background is drawn
         Similarity placement;
+        size_t number = 0;  // of the dataset
         bool tableStale = true;
         uint64_t tableVersion = 0;
         std::vector<frame::TableRecord> table;

@@ -87,6 +87,11 @@ void expectSameLayout(std::span<const uint32_t> spirv) {
                                                                    OFFSET(skippedRows),
                                                                    OFFSET(firstHitMark),
                                                                    OFFSET(rotation),
+                                                                   OFFSET(lightCount),
+                                                                   OFFSET(opacity),
+                                                                   OFFSET(unused0),
+                                                                   OFFSET(unused1),
+                                                                   OFFSET(moreLights),
                                                                    OFFSET(sections)}));
 }
 
@@ -116,12 +121,13 @@ TEST(FrameLayout, Mesostructure) {
     EXPECT_EQ(offsets.at("MesoBorder"), (Words{AT(MesoBorder, azimuth), AT(MesoBorder, elevation)}));
     EXPECT_EQ(
         offsets.at("MesoView"),
-        (Words{AT(MesoView, eye),        AT(MesoView, eyeX),     AT(MesoView, eyeY),        AT(MesoView, forward),
-               AT(MesoView, forwardX),   AT(MesoView, forwardY), AT(MesoView, width),       AT(MesoView, height),
-               AT(MesoView, nodes),      AT(MesoView, withBase), AT(MesoView, light),       AT(MesoView, shadowLift),
-               AT(MesoView, colour),     AT(MesoView, unused0),  AT(MesoView, up),          AT(MesoView, shows),
-               AT(MesoView, colours),    AT(MesoView, normals),  AT(MesoView, strayPixels), AT(MesoView, meanHeight),
-               AT(MesoView, farShadows), AT(MesoView, unused1)}));
+        (Words{
+            AT(MesoView, eye),        AT(MesoView, eyeX),         AT(MesoView, eyeY),        AT(MesoView, forward),
+            AT(MesoView, forwardX),   AT(MesoView, forwardY),     AT(MesoView, width),       AT(MesoView, height),
+            AT(MesoView, nodes),      AT(MesoView, withBase),     AT(MesoView, light),       AT(MesoView, shadowLift),
+            AT(MesoView, colour),     AT(MesoView, unused0),      AT(MesoView, up),          AT(MesoView, shows),
+            AT(MesoView, colours),    AT(MesoView, normals),      AT(MesoView, strayPixels), AT(MesoView, meanHeight),
+            AT(MesoView, farShadows), AT(MesoView, sectionCount), AT(MesoView, sections)}));
     EXPECT_EQ(offsets.at("MesoImage"),
               (Words{AT(MesoImage, first), AT(MesoImage, width), AT(MesoImage, height), AT(MesoImage, levels)}));
 }

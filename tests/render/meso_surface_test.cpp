@@ -319,6 +319,66 @@ TEST_F(MesoSurfaces, ShadowsFallBehindWhatStands) {
     EXPECT_EQ(brightness(plateau(), true), brightness(plateau(), false));
 }
 
+// A plane through the slab leaves a half of it, and shows what is solid there.
+TEST_F(MesoSurfaces, SectionPlanesCutThem) {
+    for (const char* method : {"boxes", "cells", "pyramid", "relief-illinois"}) {
+        SCOPED_TRACE(method);
+        FrameRequest request = fromAbove();
+        const std::vector<MesoSurface> slab{surfaceOf(plateau(), method, "quad", 0.5)};
+        draw(slab, request);
+        const auto whole = *renderer_->readDepth();
+        request.sections = {{{2, 0, 0}, 0.4}};
+        draw(slab, request);
+        const auto right = *renderer_->readDepth();
+        for (uint32_t y = 0; y < kEdge; ++y)
+            for (uint32_t x = 0; x < kEdge; ++x) {
+                const size_t i = y * kEdge + x;
+                const double at = placeOf(x, y).x;
+                if (std::abs(at - 0.2) < 0.05) continue;
+                ASSERT_EQ(right[i], at > 0.2 ? whole[i] : std::numeric_limits<float>::infinity()) << x << ", " << y;
+            }
+        // From above, a plane below the top: its cut is flat, and turned to the eye. Pyramids do not know what is
+        // solid.
+        if (std::string_view(method) == "pyramid") continue;
+        request.sections = {{{0, 0, -1}, -0.2}};
+        draw(slab, request);
+        const auto cut = *renderer_->readDepth();
+        const auto normals = *renderer_->readNormals();
+        uint64_t hits = 0;
+        for (size_t i = 0; i < cut.size(); ++i) {
+            if (!std::isfinite(cut[i])) continue;
+            ++hits;
+            ASSERT_NEAR(cut[i], 5 - 0.2, 2e-3);
+            ASSERT_GT(normals[i].z, 0.99f);
+        }
+        EXPECT_GT(hits, uint64_t{kEdge} * kEdge / 3);
+        // What is cut away casts no shadow.
+        request.sections = {{{1, 0, 0}, 50}};
+        EXPECT_EQ(draw(slab, request).hitPixels, 0u);
+    }
+}
+
+TEST_F(MesoSurfaces, TheirBytesAreTakenFromTheBudget) {
+    const OverACube over;
+    const Asset asset = plateau();
+    const std::vector<MesoSurface> surfaces{surfaceOf(asset, "boxes", "quad", 0.5)};
+    const uint64_t bytes = draw(surfaces, fromAbove()).surfaceBytes;
+    ASSERT_GT(bytes, 0u);
+    renderer_->close();
+    ASSERT_TRUE(renderer_->setBudgets((1 << 20) + bytes - 1, 16 << 20).error().code == ErrorCode::Limit);
+    RendererOptions options;
+    options.budgetBytes = (1 << 20) + bytes - 1;
+    start(options);
+    const PlacedDataset cube{over.scene.dataset, over.scene.source, {}};
+    EXPECT_EQ(renderer_->open({cube}, surfaces).error().code, ErrorCode::Limit);
+    EXPECT_TRUE(renderer_->open({cube}, {}));
+    options.budgetBytes = (1 << 20) + bytes;
+    start(options);
+    ASSERT_TRUE(renderer_->open({cube}, surfaces));
+    const FrameStats stats = RendererFixture::draw(over.request);
+    EXPECT_LE(stats.poolBytes + stats.surfaceBytes, options.budgetBytes);
+}
+
 TEST_F(MesoSurfaces, SceneWithoutMesostructurePaysNothing) {
     const OverACube over;
     show(over.scene);

@@ -162,6 +162,127 @@ TEST_F(SceneLight, WhatIsHiddenCastsNothing) {
     EXPECT_EQ(device.picture, drawnBy(*renderer_, request).picture);
 }
 
+/// The light of an encoded channel.
+double lightOf(uint8_t channel) { return std::pow(channel / 255.0, 2.2); }
+
+TEST_F(SceneLight, WhatIsTransparentLetsThroughWhatIsBehind) {
+    openTwo(kElsewhere);
+    for (PictureRenderer* renderer :
+         {static_cast<PictureRenderer*>(host_.get()), static_cast<PictureRenderer*>(renderer_.get())}) {
+        FrameRequest request = litRequest(views()[0].camera);
+        request.shading.shadows = false;
+        const Planes solid = drawnBy(*renderer, request, 16);
+        request.looks = {{1, {}, 0}};
+        const Planes gone = drawnBy(*renderer, request, 16);
+        request.looks = {{1, {}, 0.25f}};
+        const Planes part = drawnBy(*renderer, request, 16);
+        uint64_t checked = 0;
+        for (size_t i = 0; i < solid.picture.rgba.size(); i += 4) {
+            // Away from edges, where a pixel's samples differ.
+            if (channelsApart(solid.picture, gone.picture, i / 4) < 12) continue;
+            const double expected = 0.75 * lightOf(gone.picture.rgba[i]) + 0.25 * lightOf(solid.picture.rgba[i]);
+            checked += std::abs(lightOf(part.picture.rgba[i]) - expected) < 0.02 ? 1 : 0;
+        }
+        EXPECT_GT(checked, 500u);
+        request.hidden = {1};
+        EXPECT_EQ(drawnBy(*renderer, request, 16).picture, gone.picture) << "what is not there is as hidden";
+    }
+}
+
+TEST_F(SceneLight, LooksByHostAndDevice) {
+    openTwo(kElsewhere);
+    Difference all;
+    for (const NamedCamera& named : views()) {
+        FrameRequest request = litRequest(named.camera);
+        request.looks = {{0, glm::vec3(0.1f, 0.3f, 0.7f), 1}, {1, glm::vec3(0.8f, 0.1f, 0.1f), 0.6f}};
+        all += difference(request, kCell);
+        request.shading.shadows = false;
+        all += difference(request, kCell);
+        const Planes drawn = drawnBy(*host_, request);
+        uint64_t red = 0, blue = 0;
+        for (size_t i = 0; i < drawn.picture.rgba.size(); i += 4) {
+            red += drawn.picture.rgba[i] > drawn.picture.rgba[i + 2] + 20 ? 1 : 0;
+            blue += drawn.picture.rgba[i + 2] > drawn.picture.rgba[i] + 20 ? 1 : 0;
+        }
+        EXPECT_GT(red, 500u);
+        EXPECT_GT(blue, 500u);
+    }
+    expectFew(all);
+}
+
+/// Lights from the sides, beside the request's own.
+std::vector<DirectedLight> moreLights() {
+    return {{false, {-1, 0.3f, 0.6f}, 0.5f}, {true, {0.8f, 0.2f, 0.6f}, 0.3f}, {false, {0.1f, 1, 0.4f}, 0.25f}};
+}
+
+TEST_F(SceneLight, SeveralLightsByHostAndDevice) {
+    Difference all;
+    for (const bool isOne : {true, false}) {
+        openTwo(kElsewhere);
+        if (isOne) open({placed(statue_->file(), kElsewhere)});
+        for (const NamedCamera& named : views())
+            for (const uint32_t sky : {0u, 3u}) {
+                SCOPED_TRACE(named.name);
+                FrameRequest request = litRequest(named.camera);
+                request.shading.occlusionRays = sky;
+                request.shading.moreLights = moreLights();
+                request.shading.lightStrength = 0.7f;
+                all += difference(request, kCell);
+                request.shading.shadows = false;
+                request.shading.moreLights.pop_back();
+                all += difference(request, kCell);
+            }
+    }
+    expectFew(all);
+}
+
+TEST_F(SceneLight, LightsAddUp) {
+    openTwo();
+    FrameRequest request = litRequest(views()[0].camera);
+    request.shading.clay = glm::vec3(0.3f);
+    const std::vector<DirectedLight> lights = moreLights();
+    const auto drawnWith = [&](const std::vector<DirectedLight>& with) {
+        setLights(request.shading, with);
+        return drawnBy(*host_, request);
+    };
+    // The sky's light, which is in each of them, comes from the camera's up where the first light follows the camera.
+    const auto darkWith = [&](const DirectedLight& light) {
+        return drawnWith({{light.followsCamera, light.direction, 0}});
+    };
+    const Planes dark = darkWith(lights.front()), all = drawnWith(lights);
+    std::vector<std::pair<Planes, Planes>> single;
+    for (const DirectedLight& light : lights) single.emplace_back(drawnWith({light}), darkWith(light));
+    uint64_t shaded = 0, checked = 0;
+    for (size_t i = 0; i < dark.depth.size(); ++i) {
+        if (!std::isfinite(dark.depth[i])) continue;
+        double sum = lightOf(dark.picture.rgba[4 * i]);
+        for (const auto& [one, without] : single) {
+            const double own = lightOf(one.picture.rgba[4 * i]) - lightOf(without.picture.rgba[4 * i]);
+            sum += own;
+            shaded += own < 1e-6 ? 1 : 0;
+        }
+        EXPECT_NEAR(lightOf(all.picture.rgba[4 * i]), std::min(sum, 1.0), 0.02);
+        ++checked;
+    }
+    EXPECT_GT(checked, 5000u);
+    EXPECT_GT(shaded, 1000u) << "each of them casts its own shadows";
+}
+
+TEST_F(SceneLight, OneLightOfStrengthOneIsThePlainLight) {
+    openTwo(kElsewhere);
+    for (const uint32_t sky : {0u, 2u}) {
+        FrameRequest request = litRequest(views()[1].camera);
+        request.shading.occlusionRays = sky;
+        const Planes host = drawnBy(*host_, request), device = drawnBy(*renderer_, request);
+        const uint32_t pipelines = draw(request).pipelines;
+        // A light that gives nothing changes nothing, and takes no pipeline.
+        request.shading.moreLights = {{false, {0, 0, 1}, 0}};
+        EXPECT_EQ(drawnBy(*host_, request).picture, host.picture);
+        EXPECT_EQ(drawnBy(*renderer_, request).picture, device.picture);
+        EXPECT_EQ(draw(request).pipelines, pipelines);
+    }
+}
+
 // One dataset alone takes the passes that it took; a second one adds none but those of the scene.
 TEST_F(SceneLight, OneDatasetPaysNothing) {
     openTwo();

@@ -166,16 +166,6 @@ TEST_F(SeveralDatasets, TakeNoMoreThanTheBudgetTogether) {
         << "no memory to read the coarsest pages";
 }
 
-TEST(BudgetShares, WhatSmallOnesDoNotNeedGoesToTheLarge) {
-    constexpr uint64_t kM = 1 << 20;
-    EXPECT_EQ(budgetShares(100 * kM, std::array{uint64_t{7}}), std::vector{100 * kM}) << "one has all";
-    const auto shares = budgetShares(100 * kM, std::array{8 * kM, 1000 * kM, 900 * kM});
-    EXPECT_EQ(shares[0], 10 * kM);
-    EXPECT_EQ(shares[1], 45 * kM);
-    EXPECT_EQ(shares[2], 45 * kM);
-    EXPECT_TRUE(budgetShares(100, {}).empty());
-}
-
 TEST(SimilarityOfAMatrix, OnlySimilarities) {
     const auto of = [](std::array<double, 16> rows) { return similarityFromMatrix(rows); };
     const auto moved = of({0, -2, 0, 10, 2, 0, 0, 20, 0, 0, 2, 30, 0, 0, 0, 1});

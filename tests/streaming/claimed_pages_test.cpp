@@ -131,11 +131,12 @@ TEST(ClaimedPages, TheFirstPartAndWhatViewsMakeOfItTakeWhatCame) {
     const auto dataset = std::make_shared<const Dataset>(*std::move(start));
     ASSERT_LT(grownSince(before), kMost);
 
-    ResidencyPolicy policy(dataset, false, poolShapeFor(*dataset, false, 64 << 20, 16 << 20));
+    const PooledDataset pooled{dataset, false};
+    ResidencyPolicy policy({&pooled, 1}, poolShapeFor({&pooled, 1}, 64 << 20, 16 << 20));
     EXPECT_TRUE(policy.hasRoom());
     SelectionView view = viewOfAll();
     for (int frame = 0; frame < 3; ++frame, view.eye.x += 0.01) {
-        policy.look(view, frame);
+        policy.look(test::only(view), frame);
         for (const Wish& wish : policy.finish().wishes) policy.place(wish.request.number);
     }
     EXPECT_EQ(policy.pagesResident(), 9u);

@@ -48,7 +48,8 @@ Settled settle(const std::shared_ptr<const Dataset>& dataset, const test::Counte
     const auto reader = std::shared_ptr<const ByteReader>(&file, [](const ByteReader*) {});
     const FilePageSource source(reader, dataset);
     const bool colour = dataset->hasColour();
-    ResidencyPolicy policy(dataset, colour, poolShapeFor(*dataset, colour, budget, chunkBytes));
+    const PooledDataset pooled{dataset, colour};
+    ResidencyPolicy policy({&pooled, 1}, poolShapeFor({&pooled, 1}, budget, chunkBytes));
     std::mt19937_64 random(seed);
     Settled settled;
     std::vector<Wish> wishes;
@@ -64,14 +65,14 @@ Settled settle(const std::shared_ptr<const Dataset>& dataset, const test::Counte
             else if (policy.giveUp(wish.request))
                 ++settled.problems;
         }
-        policy.look(view, round);
+        policy.look(test::only(view), round);
         for (const uint64_t page : pages) policy.place(page);
         const PolicyOutcome outcome = policy.finish();
         for (const Wish& wish : outcome.wishes)
             EXPECT_TRUE(!wish.request.isPage() || dataset->pages.knows(wish.request.number));
         wishes = outcome.wishes;
-        settled.cut = outcome.drawable;
-        EXPECT_EQ(outcome.drawable.complete, outcome.missing == 0);
+        settled.cut = outcome.cuts[0];
+        EXPECT_EQ(outcome.cuts[0].complete, outcome.missing[0] == 0);
         if (settled.cut.complete && round > 1) return settled;
     }
     ADD_FAILURE() << "does not settle";
@@ -144,11 +145,11 @@ TEST(DirectoryParts, AMovingViewAsksForBlocksOfWhatComesLater) {
     int now = 0, ahead = 0;
     for (int i = 0; i < 10; ++i) {
         const auto start = scan.start();
-        ResidencyPolicy policy(start, start->hasColour(),
-                               poolShapeFor(*start, start->hasColour(), uint64_t{1} << 30, uint64_t{1} << 40));
+        const PooledDataset pooled{start, start->hasColour()};
+        ResidencyPolicy policy({&pooled, 1}, poolShapeFor({&pooled, 1}, uint64_t{1} << 30, uint64_t{1} << 40));
         SelectionView view = test::randomView(random, 0.5);
         const auto blocksWished = [&](double seconds, bool urgent) {
-            policy.look(view, seconds);
+            policy.look(test::only(view), seconds);
             const auto wishes = policy.finish().wishes;
             return std::count_if(wishes.begin(), wishes.end(), [&](const Wish& wish) {
                 return !wish.request.isPage() && (wish.priority > 1e6) == urgent;

@@ -145,13 +145,13 @@ public:
     Flight(const World& world, uint64_t budgetBytes, uint64_t seed, bool hiddenToo = false)
         : world_(world),
           random_(seed),
-          policy(world.dataset, world.dataset->hasColour(),
-                 poolShapeFor(*world.dataset, world.dataset->hasColour(), budgetBytes, kChunkBytes),
-                 LoadOrder::Feedback, hiddenToo) {}
+          pooled_{world.dataset, world.dataset->hasColour()},
+          policy({&pooled_, 1}, poolShapeFor({&pooled_, 1}, budgetBytes, kChunkBytes), LoadOrder::Feedback, hiddenToo) {
+    }
 
     /// One round; true when the view has settled.
     bool round(const SelectionView& view, uint64_t most) {
-        policy.look(view, now_ += 0.02);
+        policy.look(test::only(view), now_ += 0.02);
         for (uint64_t i = 0; i < most && !wishes_.empty(); ++i) {
             std::swap(wishes_[random_() % wishes_.size()], wishes_.back());
             policy.place(wishes_.back().request.number);
@@ -159,15 +159,15 @@ public:
         }
         outcome = policy.finish();
         wishes_ = outcome.wishes;
-        const auto cut = std::pair(outcome.drawable.cut, outcome.drawable.partial);
-        const bool wasHeard = outcome.drawable.complete && heard_ == cut && heardOf_ == view;
-        if (outcome.drawable.complete || random_() % 3 == 0) {
+        const auto cut = std::pair(outcome.cuts[0].cut, outcome.cuts[0].partial);
+        const bool wasHeard = outcome.cuts[0].complete && heard_ == cut && heardOf_ == view;
+        if (outcome.cuts[0].complete || random_() % 3 == 0) {
             ++frames;
-            policy.see(world_.hits(view, outcome.drawable), view);
+            policy.see(world_.hits(view, outcome.cuts[0]), view);
             heard_ = cut;
             heardOf_ = view;
         }
-        return outcome.drawable.complete && (outcome.drawable.pagesUnseen == 0 || wasHeard);
+        return outcome.cuts[0].complete && (outcome.cuts[0].pagesUnseen == 0 || wasHeard);
     }
 
     void settle(const SelectionView& view) {
@@ -176,13 +176,14 @@ public:
 
     [[nodiscard]] std::set<uint64_t> resident() const {
         std::set<uint64_t> pages;
-        policy.forEachResident([&](uint64_t page) { pages.insert(page); });
+        for (const uint64_t page : policy.residentPages(0)) pages.insert(page);
         return pages;
     }
 
 private:
     const World& world_;
     std::mt19937_64 random_;
+    PooledDataset pooled_;
 
 public:
     ResidencyPolicy policy;
@@ -209,7 +210,7 @@ TEST(PagesSeen, AnyOrderComesToTheLeastPagesThatAreEnough) {
             Flight run(world, kEnough, 10 * seed + order);
             run.settle(view);
             EXPECT_EQ(run.resident(), least);
-            EXPECT_EQ(world.castAll(view, run.outcome.drawable), picture(world, view));
+            EXPECT_EQ(world.castAll(view, run.outcome.cuts[0]), picture(world, view));
         }
         Flight all(world, kEnough, seed, true);
         all.settle(view);
@@ -228,7 +229,7 @@ TEST(PagesSeen, APictureDoesNotDependOnWhatCameBefore) {
         for (int i = 0; i < 30; ++i)
             wild.round(world.view(0.05 + 0.1 * (i % 4), {-2, 0.01 * i, 0.3}), 1 + uint64_t(i) % 9);
         wild.settle(view);
-        EXPECT_EQ(world.castAll(view, wild.outcome.drawable), picture(world, view));
+        EXPECT_EQ(world.castAll(view, wild.outcome.cuts[0]), picture(world, view));
     }
 }
 
@@ -246,18 +247,18 @@ TEST(PagesSeen, NorDoesItWhereTheBudgetIsTooSmall) {
             Flight plain(world, budget, 1);
             if (!plain.policy.hasRoom()) continue;
             plain.settle(view);
-            const auto expected = world.castAll(view, plain.outcome.drawable);
-            if (!plain.outcome.drawable.isRelaxed) {
+            const auto expected = world.castAll(view, plain.outcome.cuts[0]);
+            if (!plain.outcome.cuts[0].isRelaxed) {
                 ++hitFits;
                 EXPECT_EQ(expected, picture(world, view));
             }
-            relaxed += plain.outcome.drawable.isRelaxed ? 1 : 0;
+            relaxed += plain.outcome.cuts[0].isRelaxed ? 1 : 0;
             for (uint64_t history = 0; history < 3; ++history) {
                 Flight wild(world, budget, seed + 100 * history);
                 for (int i = 0; i < 20; ++i) wild.round(world.view(0.1, {-2, 0.01 * i, 0.3}), 5);
                 wild.settle(view);
-                EXPECT_EQ(world.castAll(view, wild.outcome.drawable), expected);
-                EXPECT_EQ(wild.outcome.drawable.isRelaxed, plain.outcome.drawable.isRelaxed);
+                EXPECT_EQ(world.castAll(view, wild.outcome.cuts[0]), expected);
+                EXPECT_EQ(wild.outcome.cuts[0].isRelaxed, plain.outcome.cuts[0].isRelaxed);
             }
         }
     }

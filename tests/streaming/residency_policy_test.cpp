@@ -34,8 +34,9 @@ public:
         : dataset_(std::move(dataset)),
           c_(std::move(conditions)),
           random_(c_.seed),
-          shape_(poolShapeFor(*dataset_, dataset_->hasColour(), c_.budgetBytes, c_.chunkBytes)),
-          policy(dataset_, dataset_->hasColour(), shape_, c_.order),
+          pooled_{dataset_, dataset_->hasColour()},
+          shape_(poolShapeFor({&pooled_, 1}, c_.budgetBytes, c_.chunkBytes)),
+          policy({&pooled_, 1}, shape_, c_.order),
           queue_({.attempts = 12, .damagedAttempts = 12}),
           content_(shape_.units, kNothing) {
         EXPECT_LE(shape_.units * kPoolUnitBytes, c_.budgetBytes);
@@ -61,7 +62,7 @@ public:
             ++reads;
             read.push_back(page);
         }
-        policy.look(view, now_, number);
+        policy.look(test::only(view), now_, number);
         for (const uint64_t page : read) carryOut(page, policy.place(page));
         // Rays may ask for anything.
         if (c_.failRate > 0)
@@ -72,7 +73,7 @@ public:
         queue_.replace(outcome.wishes);
         check();
         // Nothing wanted is missing, so nothing of it is queued or under way.
-        return outcome.drawable.complete;
+        return outcome.cuts[0].complete;
     }
 
     /// Rounds of a still view until it has settled.
@@ -81,12 +82,12 @@ public:
         const uint64_t reloads = policy.counts().reloads;
         for (int i = 0; !round(view); ++i) ASSERT_LT(i, 20000) << "does not settle";
         EXPECT_EQ(policy.counts().reloads, reloads) << "a still view loaded a page twice";
-        const auto cut = outcome.drawable.cut;
+        const auto cut = outcome.cuts[0].cut;
         const uint64_t loads = policy.counts().loads;
         // What was under way for other views may still arrive; the picture stays.
         for (int i = 0; i < 20; ++i) {
             EXPECT_TRUE(round(view));
-            EXPECT_EQ(outcome.drawable.cut, cut);
+            EXPECT_EQ(outcome.cuts[0].cut, cut);
         }
         for (const Wish& wish : outcome.wishes) ADD_FAILURE() << "settled, and wishes for page " << wish.request.number;
         EXPECT_GE(policy.counts().loads, loads);
@@ -94,7 +95,7 @@ public:
 
     /// Another pool; its content is lost.
     void setBudget(uint64_t budgetBytes) {
-        shape_ = poolShapeFor(*dataset_, dataset_->hasColour(), budgetBytes, c_.chunkBytes);
+        shape_ = poolShapeFor({&pooled_, 1}, budgetBytes, c_.chunkBytes);
         content_.assign(shape_.units, kNothing);
         policy.setPool(shape_);
         EXPECT_EQ(policy.unitsTaken(), 0u);
@@ -143,12 +144,13 @@ private:
         ASSERT_EQ(units, policy.unitsTaken());
         mostBytes = std::max(mostBytes, policy.bytesHeld());
         mostEntries = std::max(mostEntries, queue_.entries());
-        for (const uint64_t page : outcome.drawable.cut) ASSERT_TRUE(policy.isResident(page));
+        for (const uint64_t page : outcome.cuts[0].cut) ASSERT_TRUE(policy.isResident(page));
     }
 
     std::shared_ptr<const Dataset> dataset_;
     Conditions c_;
     std::mt19937_64 random_;
+    PooledDataset pooled_;
     PoolShape shape_;
 
 public:
@@ -240,14 +242,14 @@ TEST(ResidencyPolicy, SettlesOnTheSamePagesWhateverTheHistoryOrderAndFaults) {
                 wild.round(moving);
             }
             wild.settle(view);
-            EXPECT_EQ(wild.outcome.drawable.cut, plain.outcome.drawable.cut);
-            EXPECT_EQ(wild.outcome.drawable.errorPixels, plain.outcome.drawable.errorPixels);
+            EXPECT_EQ(wild.outcome.cuts[0].cut, plain.outcome.cuts[0].cut);
+            EXPECT_EQ(wild.outcome.cuts[0].errorPixels, plain.outcome.cuts[0].errorPixels);
         }
-        const bool same = plain.outcome.drawable.cut == idealCut(*dataset, view, {});
-        EXPECT_EQ(same, !plain.outcome.drawable.isRelaxed)
+        const bool same = plain.outcome.cuts[0].cut == idealCut(*dataset, view, {});
+        EXPECT_EQ(same, !plain.outcome.cuts[0].isRelaxed)
             << "relaxed is said where, and only where, the budget is too small";
         differentFromIdeal += same ? 0 : 1;
-        relaxed += plain.outcome.drawable.isRelaxed ? 1 : 0;
+        relaxed += plain.outcome.cuts[0].isRelaxed ? 1 : 0;
     }
     EXPECT_GT(relaxed, 5);
     EXPECT_LT(differentFromIdeal, 55) << "and budgets that suffice were among them";
@@ -261,8 +263,8 @@ TEST(ResidencyPolicy, ABudgetThatSufficesGivesTheUnbudgetedPicture) {
         const SelectionView view = test::randomView(random, 0.5);
         Simulation all(dataset, {.budgetBytes = UINT64_MAX >> 1, .failRate = 0, .bad = {}, .seed = seed});
         all.settle(view);
-        EXPECT_EQ(all.outcome.drawable.cut, idealCut(*dataset, view, {}));
-        EXPECT_FALSE(all.outcome.drawable.isRelaxed);
+        EXPECT_EQ(all.outcome.cuts[0].cut, idealCut(*dataset, view, {}));
+        EXPECT_FALSE(all.outcome.cuts[0].isRelaxed);
     }
 }
 
@@ -278,7 +280,7 @@ TEST(ResidencyPolicy, PagesThatCannotBeReadAreDrawnFromTheirParents) {
         for (glm::dvec4& plane : view.planes) plane = {0, 0, 0, 1};  // all is in view: all is wanted
         Simulation damaged(dataset, {.budgetBytes = UINT64_MAX >> 1, .failRate = 0.1, .bad = bad, .seed = seed});
         damaged.settle(view);
-        EXPECT_EQ(damaged.outcome.drawable.cut, idealCut(*dataset, view, bad));
+        EXPECT_EQ(damaged.outcome.cuts[0].cut, idealCut(*dataset, view, bad));
     }
 }
 
@@ -322,12 +324,12 @@ TEST(ResidencyPolicy, LooksAheadAlongTheMotionOnly) {
     const uint64_t still = sim.policy.counts().loads;
     view.eye.x += 0.3;
     sim.round(view);
-    EXPECT_GT(sim.outcome.wishes.size(), sim.outcome.missing) << "nearer pages, which this view does not want yet";
+    EXPECT_GT(sim.outcome.wishes.size(), sim.outcome.missing[0]) << "nearer pages, which this view does not want yet";
     const auto wishes = sim.outcome.wishes;
     EXPECT_TRUE(std::is_sorted(wishes.begin(), wishes.end(),
                                [](const auto& a, const auto& b) { return a.priority > b.priority; }));
     sim.round(view);
-    EXPECT_EQ(sim.outcome.wishes.size(), sim.outcome.missing) << "it stands still";
+    EXPECT_EQ(sim.outcome.wishes.size(), sim.outcome.missing[0]) << "it stands still";
     EXPECT_GE(sim.policy.counts().loads, still);
 }
 
@@ -365,7 +367,7 @@ TEST(ResidencyPolicy, WithAnotherPoolItSettlesAsIfItHadAlwaysBeenThere) {
             fresh.settle(view);
             sim.setBudget(budget);
             sim.settle(view);
-            EXPECT_EQ(sim.outcome.drawable.cut, fresh.outcome.drawable.cut);
+            EXPECT_EQ(sim.outcome.cuts[0].cut, fresh.outcome.cuts[0].cut);
         }
     }
 }
@@ -376,11 +378,11 @@ TEST(ResidencyPolicy, AfterALossTheSameViewSettlesAgain) {
     const SelectionView view = test::randomView(random, 0.5);
     Simulation sim(dataset, {.budgetBytes = allBytes(*dataset), .failRate = 0, .bad = {}, .seed = 5});
     sim.settle(view);
-    const auto cut = sim.outcome.drawable.cut;
+    const auto cut = sim.outcome.cuts[0].cut;
     sim.policy.clear();
     EXPECT_EQ(sim.policy.unitsTaken(), 0u);
     for (int i = 0; !sim.round(view); ++i) ASSERT_LT(i, 10000);
-    EXPECT_EQ(sim.outcome.drawable.cut, cut);
+    EXPECT_EQ(sim.outcome.cuts[0].cut, cut);
 }
 
 /// `count` views of a dataset, near each other or not.
@@ -406,7 +408,7 @@ std::vector<DrawableCut> settleAll(Simulation& sim, std::span<const SelectionVie
     EXPECT_TRUE(all()) << "settled views stay settled";
     EXPECT_TRUE(sim.outcome.wishes.empty());
     std::vector<DrawableCut> drawn;
-    for (ViewNumber number = 0; number < views.size(); ++number) drawn.push_back(sim.policy.drawable(number));
+    for (ViewNumber number = 0; number < views.size(); ++number) drawn.push_back(sim.policy.drawable(number, 0));
     return drawn;
 }
 
@@ -464,8 +466,8 @@ TEST(ResidencyPolicy, WhatJustCameStaysForAWhileInSeconds) {
     // Two views in turn, each of which wants all of the pool: what one brought the other may not take before its time.
     const auto dataset = std::make_shared<const Dataset>(test::randomTree(1, 4, 0.9, 16384));
     const uint64_t budget = allBytes(*dataset) / 3;
-    ResidencyPolicy policy(dataset, dataset->hasColour(),
-                           poolShapeFor(*dataset, dataset->hasColour(), budget, kChunkBytes));
+    const PooledDataset pooled{dataset, dataset->hasColour()};
+    ResidencyPolicy policy({&pooled, 1}, poolShapeFor({&pooled, 1}, budget, kChunkBytes));
     SelectionView views[2];
     for (int i = 0; i < 2; ++i) {
         views[i].eye = {0.5, 0.4, 0.6};
@@ -474,7 +476,7 @@ TEST(ResidencyPolicy, WhatJustCameStaysForAWhileInSeconds) {
         for (glm::dvec4& plane : views[i].planes) plane = {i == 0 ? 1 : -1, 0, 0, -0.01};
     }
     const auto placeAll = [&](const SelectionView& view, double seconds) {
-        policy.look(view, seconds);
+        policy.look(test::only(view), seconds);
         for (PolicyOutcome outcome = policy.finish(); !outcome.wishes.empty(); outcome = policy.finish())
             for (const Wish& wish : outcome.wishes) policy.place(wish.request.number);
     };

@@ -1,13 +1,18 @@
 // Directories without pages: trees for tests of selection and policy.
 #pragma once
 
+#include <array>
 #include <cmath>
+#include <optional>
 #include <random>
 #include <vector>
 
 #include "streaming/page_selection.h"
 
 namespace vcp::test {
+
+/// What a view sees where there is one dataset.
+inline std::array<std::optional<SelectionView>, 1> only(const SelectionView& view) { return {view}; }
 
 /// A tree of at most `levels` levels over the unit cube: each octant of a page has a page with probability
 /// `density`, of up to `maxBytes`; a page errs by about 0.01 of its edge.

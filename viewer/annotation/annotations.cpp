@@ -53,8 +53,7 @@ public:
                     canvas_.disc(*at, units(4), AnnotationInk::Mark);
                 }
             for (size_t i = 0; i < line.lengths.size(); ++i)
-                if (const auto segment = projector.segment(line.points[i], line.points[i + 1]))
-                    write(0.5 * (segment->from + segment->to) + glm::dvec2(units(12), -units(8)), line.lengths[i]);
+                if (const auto at = lengthPlace(projector, line, i)) write(*at, line.lengths[i]);
         }
     }
 
@@ -108,6 +107,14 @@ public:
         const double left = view_.high.x - units(kInset) - width;
         double bottom = view_.high.y - units(kInset);
         if (left < free + units(kLegendGap)) bottom -= units(kScaleBarHeight);
+        // At the upper edge, where they would cover a measured length below.
+        double height = -units(kLegendGap);
+        for (const Legend& legend : annotations_.legends) height += heightOf(legend) + units(kLegendGap);
+        const auto coversLength = [&](double end) {
+            return doesCoverLength({{left, end - height}, {left + width, end}});
+        };
+        const double upper = view_.low.y + units(kInset) + height;
+        if (coversLength(bottom) && !coversLength(upper)) bottom = upper;
         for (const Legend& legend : annotations_.legends)
             bottom = drawLegend(legend, {left, bottom}, width) - units(kLegendGap);
     }
@@ -132,11 +139,36 @@ private:
         return std::round(std::max(bar, canvas_.textSize(legend.title()).x) + 2 * units(kLegendPadding));
     }
 
+    /// Returns how high a legend is, with what is around it.
+    [[nodiscard]] double heightOf(const Legend& legend) const {
+        const double line = canvas_.textSize(legend.title()).y;
+        return 2 * (units(kLegendPadding) + line + units(kLegendGap)) + units(kLegendBar);
+    }
+
+    /// Returns where the length of a segment is written, if it is in the picture.
+    [[nodiscard]] std::optional<glm::dvec2> lengthPlace(const Projector& projector, const AnnotatedLine& line,
+                                                        size_t i) const {
+        const auto segment = projector.segment(line.points[i], line.points[i + 1]);
+        if (!segment) return std::nullopt;
+        return 0.5 * (segment->from + segment->to) + glm::dvec2(units(12), -units(8));
+    }
+
+    [[nodiscard]] bool doesCoverLength(const Box2& box) const {
+        const Projector projector(view_.camera, view_.size);
+        const glm::dvec2 border(units(kPlateX), units(kPlateY));
+        for (const AnnotatedLine& line : annotations_.lines)
+            for (size_t i = 0; i < line.lengths.size(); ++i)
+                if (const auto at = lengthPlace(projector, line, i);
+                    at && box.doesTouch({*at - border, *at + canvas_.textSize(line.lengths[i]) + border}))
+                    return true;
+        return false;
+    }
+
     /// Draws a title, a bar of colours and its numbers. Returns where they begin.
     [[nodiscard]] double drawLegend(const Legend& legend, glm::dvec2 lowerLeft, double width) const {
         const double line = canvas_.textSize(legend.title()).y;
         const double padding = units(kLegendPadding), gap = units(kLegendGap);
-        const double left = std::round(lowerLeft.x), top = lowerLeft.y - 2 * (padding + line + gap) - units(kLegendBar);
+        const double left = std::round(lowerLeft.x), top = lowerLeft.y - heightOf(legend);
         if (left < view_.low.x || top < view_.low.y) return lowerLeft.y;
         canvas_.plate({left, top}, {left + width, lowerLeft.y});
         const double from = std::round(left + padding), to = std::round(left + width - padding);

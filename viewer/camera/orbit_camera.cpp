@@ -190,6 +190,18 @@ void OrbitCamera::fit(const Box& box, glm::ivec2 size, const PictureMargins& cov
     position = centre - forwardVector() * back - orientation * glm::dvec3(middle * focusDistance, 0);
 }
 
+void OrbitCamera::fitAround(const Box& box, glm::ivec2 size, int count) {
+    fit(box, size);
+    const double nearest = focusDistance;
+    for (int i = 1; i < count; ++i) {
+        OrbitCamera turned = *this;
+        turned.orbit(box.centre(), 2 * std::numbers::pi * i / count, 0);
+        turned.fit(box, size);
+        focusDistance = std::max(focusDistance, turned.focusDistance);
+    }
+    position -= forwardVector() * (focusDistance - nearest);
+}
+
 void OrbitCamera::look(View view, const Box& box, glm::ivec2 size, const PictureMargins& covered) {
     // With y up the front faces +z; with z up it faces -y. The other views follow from front and up.
     const glm::dvec3 upward = axisOf(up);

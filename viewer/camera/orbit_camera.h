@@ -110,6 +110,10 @@ struct OrbitCamera {
     /// covered, with its middle in the middle of that part.
     void fit(const Box& box, glm::ivec2 size, const PictureMargins& covered = {});
 
+    /// Does so, as far away as an eye must be that then goes around the box in `count` steps (turntable) and sees all
+    /// of it each time.
+    void fitAround(const Box& box, glm::ivec2 size, int count);
+
     /// Turns to a standard view and fits.
     void look(View view, const Box& box, glm::ivec2 size, const PictureMargins& covered = {});
 

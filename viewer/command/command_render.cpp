@@ -21,6 +21,7 @@
 #include "viewer/picture/image_files.h"
 #include "viewer/scene/option_values.h"
 #include "viewer/scene/scene_opening.h"
+#include "viewer/window/measurement.h"
 
 namespace vcp {
 
@@ -41,6 +42,11 @@ Result<PaintRows> paintOverOf(const RenderCommand& command, const OpenedScene& o
                               const std::vector<OrbitCamera>& cameras) {
     Annotations annotations{.legends = {}, .hasScaleBar = command.scaleBar, .lines = {}, .unit = command.render.unit};
     if (command.annotations) annotations.points = open.file.annotations;
+    if (!command.measurement.empty()) {
+        VCP_TRY_ASSIGN(const auto measured, readMeasurement(command.measurement));
+        if (!annotations.unit) annotations.unit = measured.unit;
+        annotations.lines = annotatedLines(measured.measurement, annotations.unit);
+    }
     const Shading& shading = command.render.shading;
     if (command.legend) {
         annotations.legends = legendsOf(shading.mode, open.legendSubject());
@@ -50,17 +56,21 @@ Result<PaintRows> paintOverOf(const RenderCommand& command, const OpenedScene& o
                              "--legend goes with --shading steps, cells, fetches, level or error, on files that "
                              "have such numbers"};
     }
-    if (!command.legend && !command.scaleBar && annotations.points.empty()) return PaintRows();
+    if (!command.legend && !command.scaleBar && annotations.points.empty() && annotations.lines.empty())
+        return PaintRows();
     std::vector<AnnotatedView> views;
     for (const OrbitCamera& camera : cameras)
         views.push_back(annotatedPicture(camera.current(), camera.viewHeight(), glm::uvec2(command.size)));
     return annotationPainter(std::move(annotations), std::move(views), hasDarkBackground(shading));
 }
 
-/// Returns the cameras of a sequence, or the one camera.
-Result<std::vector<OrbitCamera>> camerasOf(const RenderCommand& command, const OrbitCamera& camera, const Box& bounds) {
+/// Returns the cameras of a sequence, or the one camera. `isFitted`: it was chosen so that all is seen, and so is each
+/// camera of a turntable.
+Result<std::vector<OrbitCamera>> camerasOf(const RenderCommand& command, OrbitCamera camera, const Box& bounds,
+                                           bool isFitted) {
     std::vector<OrbitCamera> cameras{camera};
     if (command.turntable > 0) {
+        if (isFitted) camera.fitAround(bounds, command.size, command.turntable);
         cameras = turntable(camera, bounds.centre(), command.turntable);
     } else if (!command.path.empty()) {
         VCP_TRY_ASSIGN(const auto keys, readCameras(command.path));
@@ -97,7 +107,7 @@ Result<void> checkOptions(const RenderCommand& command) {
 OutputRules rulesOf(const RenderCommand& command, const std::vector<std::filesystem::path>& filesRead) {
     OutputRules rules{.overwrite = command.overwrite, .inputs = filesRead};
     for (const std::string& name : command.inputs) rules.inputs.emplace_back(name);
-    for (const std::string& name : {command.path, command.render.source.caFile})
+    for (const std::string& name : {command.path, command.measurement, command.render.source.caFile})
         if (!name.empty()) rules.inputs.emplace_back(name);
     if (const auto* file = std::get_if<std::filesystem::path>(&command.render.camera)) rules.inputs.push_back(*file);
     return rules;
@@ -129,10 +139,8 @@ FrameRequest requestFor(const RenderCommand& command, const SceneFile& scene, co
         request.sections = scene.sections;
         request.sectionCaps = std::max(command.render.caps, scene.sectionCaps);
     }
-    if (scene.light) {
-        request.shading.lightFollowsCamera = scene.light->followsCamera;
-        request.shading.lightDirection = scene.light->direction;
-    }
+    if (!scene.lights.empty()) setLights(request.shading, scene.lights);
+    request.looks = looksOf(scene);
     request.march = command.render.march;
     return request;
 }
@@ -157,10 +165,10 @@ Result<Json> render(const RenderCommand& command) {
     const SceneFile& scene = open.file;
     for (const std::string& warning : open.surfaces.warnings) warnOnTerminal(warning);
     const Box bounds = open.bounds();
-    VCP_TRY_ASSIGN(const auto camera, command.render.isFit() && scene.camera
-                                          ? *scene.camera
-                                          : command.render.cameraFor(bounds, command.size));
-    VCP_TRY_ASSIGN(const auto cameras, camerasOf(command, camera, bounds));
+    const bool isScenes = command.render.isFit() && scene.camera;
+    VCP_TRY_ASSIGN(const auto camera, isScenes ? *scene.camera : command.render.cameraFor(bounds, command.size));
+    const bool isFitted = !isScenes && std::holds_alternative<View>(command.render.camera);
+    VCP_TRY_ASSIGN(const auto cameras, camerasOf(command, camera, bounds, isFitted));
     VCP_TRY_ASSIGN(const auto paintOver, paintOverOf(command, open, cameras));
     const OutputRules rules = rulesOf(command, open.filesRead);
     VCP_TRY(checkOutputs(command, rules, cameras.size()));
@@ -228,13 +236,24 @@ Result<int> run(const RenderCommand& command) {
     if (isForEach) VCP_TRY(prepareOutputs(commands));
     for (const RenderCommand& each : commands) VCP_TRY(checkOutputs(each, rulesOf(command, {}), 1));
     Json pictures = Json::array();
+    std::vector<std::string> failed;
     for (const RenderCommand& each : commands) {
-        VCP_TRY_ASSIGN(auto figures, render(each));
-        if (isForEach) figures["output"] = each.output;
-        pictures.push_back(std::move(figures));
+        auto figures = render(each);
+        if (!figures) {
+            // An input that cannot be drawn does not keep the others from it.
+            if (commands.size() == 1 || figures.error().code == ErrorCode::Cancelled) return figures.error();
+            warnOnTerminal(figures.error().line());
+            failed.push_back(each.inputs.front());
+            figures = Json{{"error", figures.error().line()}};
+        }
+        if (isForEach) (*figures)["output"] = each.output;
+        pictures.push_back(*std::move(figures));
     }
     if (command.report.json) VCP_TRY(printJson(isForEach ? Json{{"pictures", pictures}} : pictures.front()));
-    return 0;
+    if (failed.empty()) return 0;
+    return Error{.code = ErrorCode::InvalidInput,
+                 .message = fmt::format("{} of {} inputs could not be drawn: {}", failed.size(), commands.size(),
+                                        fmt::join(failed, ", "))};
 }
 
 std::string checkPlane(const std::string& text) {
@@ -277,6 +296,9 @@ Command addRender(CLI::App& vcp) {
     addRenderSettings(*app, command->render);
     beginGroup(*app, help_group::kWritten);
     app->add_flag("!--no-annotations", command->annotations, "Leave out the annotations of a scene file");
+    app->add_option("--measurement", command->measurement,
+                    "Write into the picture what was measured in the window: its measurement-N.json")
+        ->type_name("FILE");
     app->add_flag("--legend", command->legend, "Write into the picture what its false colours mean");
     app->add_flag("--scale-bar", command->scaleBar, "Write into the picture how long a length is in it");
     beginGroup(*app, help_group::kLook);

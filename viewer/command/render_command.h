@@ -34,6 +34,7 @@ struct RenderCommand {
     uint32_t tile = 0;  // 0: not given
     uint32_t samples = kUsualSamples;
     bool transparent = false;
+    std::string measurement;  // a file; empty: none
     bool legend = false, scaleBar = false, annotations = true;
     int turntable = 0;
     std::string path;

@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 #include <glm/common.hpp>
+#include <glm/exponential.hpp>
 #include <glm/geometric.hpp>
 #include <nlohmann/json.hpp>
 
@@ -54,7 +55,7 @@ public:
             wrong("/datasets", fmt::format("must be a list of 1 to {} datasets", kMostSceneDatasets));
         for (size_t i = 0; i < datasets.size() && !error_; ++i)
             scene.datasets.push_back(dataset(datasets[i], fmt::format("/datasets/{}", i)));
-        if (json.contains("lights")) scene.light = light(json["lights"]);
+        if (json.contains("lights")) scene.lights = lights(json["lights"]);
         if (json.contains("camera")) scene.camera = camera(json["camera"]);
         if (json.contains("sections")) scene.sections = sections(json["sections"]);
         if (json.contains("caps")) scene.sectionCaps = caps(json["caps"]);
@@ -151,7 +152,7 @@ private:
     SceneDataset dataset(const Json& json, const std::string& at) {
         SceneDataset made;
         if (!isObject(json, at)) return made;
-        onlyKeys(json, at, {"file", "transform", "translate", "rotate", "scale"});
+        onlyKeys(json, at, {"file", "transform", "translate", "rotate", "scale", "colour", "opacity"});
         made.from = {name_, lines_(at + "/file"), "file"};
         if (!json.contains("file"))
             wrong(at, "\"file\" is missing");
@@ -159,6 +160,8 @@ private:
             wrong(at + "/file", "must be a file's name");
         else
             made.file = fileNamed(json["file"].get<std::string>());
+        if (json.contains("colour")) made.colour = colour(json["colour"], at + "/colour");
+        if (json.contains("opacity")) made.opacity = opacity(json["opacity"], at + "/opacity");
         if (json.contains("transform")) {
             for (const char* other : {"translate", "rotate", "scale"})
                 if (json.contains(other)) wrong(at + "/" + other, "does not go with \"transform\"");
@@ -241,6 +244,12 @@ private:
         return int(count);
     }
 
+    float opacity(const Json& json, const std::string& at) {
+        const double part = number(json, at);
+        if (!(part >= 0 && part <= 1)) wrong(at, "must be from 0 to 1");
+        return float(part);
+    }
+
     UpAxis upAxis(const Json& json, const std::string& at) {
         if (json != "y" && json != "z") wrong(at, "must be \"y\" or \"z\"");
         return json == "y" ? UpAxis::Y : UpAxis::Z;
@@ -309,16 +318,28 @@ private:
         return *placement;
     }
 
-    std::optional<SceneLight> light(const Json& json) {
-        if (!json.is_array() || json.size() > 1)
-            return wrong("/lights", "must be a list of at most one light; more are not supported"), std::nullopt;
-        if (json.empty() || !isObject(json[0], "/lights/0")) return std::nullopt;
-        onlyKeys(json[0], "/lights/0", {"direction", "follows_camera"});
-        SceneLight made;
-        made.direction = glm::vec3(unit(direction(json[0], "direction", "/lights/0")));
-        made.followsCamera =
-            json[0].contains("follows_camera") && flag(json[0]["follows_camera"], "/lights/0/follows_camera");
-        return made;
+    std::vector<DirectedLight> lights(const Json& json) {
+        std::vector<DirectedLight> all;
+        if (!json.is_array() || json.size() > kMostLights)
+            return wrong("/lights", fmt::format("must be a list of at most {} lights", kMostLights)), all;
+        for (size_t i = 0; i < json.size() && !error_; ++i) {
+            const std::string at = fmt::format("/lights/{}", i);
+            if (!isObject(json[i], at)) return all;
+            onlyKeys(json[i], at, {"direction", "follows_camera", "strength"});
+            DirectedLight& made = all.emplace_back();
+            made.direction = glm::vec3(unit(direction(json[i], "direction", at)));
+            made.followsCamera =
+                json[i].contains("follows_camera") && flag(json[i]["follows_camera"], at + "/follows_camera");
+            if (json[i].contains("strength")) made.strength = strength(json[i]["strength"], at + "/strength");
+        }
+        return all;
+    }
+
+    float strength(const Json& value, const std::string& at) {
+        const double number = this->number(value, at);
+        if (!(number >= 0 && number <= kStrongestLight))
+            wrong(at, fmt::format("must be from 0 to {:g}", kStrongestLight));
+        return float(number);
     }
 
     std::optional<OrbitCamera> camera(const Json& json) {
@@ -401,6 +422,17 @@ Result<Similarity> scenePlacement(std::span<const double, 16> rows) {
                      .message = fmt::format("moves by more than {:g}, or scales by more than {:g} or less than {:g}",
                                             kLargestNumber, kLargestScale, 1 / kLargestScale)};
     return placement;
+}
+
+std::vector<DatasetLook> looksOf(const SceneFile& scene) {
+    std::vector<DatasetLook> looks;
+    for (size_t i = 0; i < scene.datasets.size(); ++i) {
+        const auto& [file, placement, from, colour, opacity] = scene.datasets[i];
+        if (!colour && opacity == 1) continue;
+        DatasetLook& look = looks.emplace_back(DatasetLook{.dataset = uint32_t(i), .colour = {}, .opacity = opacity});
+        if (colour) look.colour = glm::pow(*colour, glm::vec3(2.2f));
+    }
+    return looks;
 }
 
 std::vector<std::filesystem::path> filesOf(const SceneFile& scene) {

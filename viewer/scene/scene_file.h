@@ -23,17 +23,14 @@ struct SceneDataset {
     std::string file;  ///< a .vcp or its address, or a mesh
     Similarity placement;
     ScenePlace from = {};
-};
-
-struct SceneLight {
-    bool followsCamera = true;
-    glm::vec3 direction{0};  ///< as Shading::lightDirection
+    std::optional<glm::vec3> colour = {};  ///< encoded, as the screen has it; none: its own
+    float opacity = 1;
 };
 
 struct SceneFile {
     std::vector<SceneDataset> datasets;  ///< at least one, or a surface
     std::vector<MesoSurfaceDescription> surfaces;
-    std::optional<SceneLight> light;
+    std::vector<DirectedLight> lights;  ///< at most kMostLights; none: the usual one
     std::optional<OrbitCamera> camera;
     std::vector<SectionPlane> sections;  ///< at most kMostSections
     Caps sectionCaps = Caps::None;
@@ -45,6 +42,9 @@ constexpr size_t kMostSceneDatasets = 256;
 /// A scene has at most so many annotations, their titles and texts at most so many bytes.
 constexpr size_t kMostAnnotations = 1000;
 constexpr size_t kLongestTitle = 200, kLongestText = 2000;
+
+/// Returns the looks of datasets that are not shown as they are.
+std::vector<DatasetLook> looksOf(const SceneFile& scene);
 
 /// Returns the files that a scene names: datasets and meshes without addresses, assets, bases and textures.
 std::vector<std::filesystem::path> filesOf(const SceneFile& scene);

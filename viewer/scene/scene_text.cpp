@@ -22,6 +22,8 @@ Json datasetJson(const SceneDataset& dataset) {
     if (const double angle = glm::angle(placement.rotation); angle != 0)
         json["rotate"] = {{"axis", triple(glm::axis(placement.rotation))}, {"degrees", angle * 180 / std::numbers::pi}};
     if (placement.scale != 1) json["scale"] = placement.scale;
+    if (dataset.colour) json["colour"] = Json::array({dataset.colour->r, dataset.colour->g, dataset.colour->b});
+    if (dataset.opacity != 1) json["opacity"] = dataset.opacity;
     return json;
 }
 
@@ -94,9 +96,14 @@ std::string sceneToJson(const SceneFile& scene) {
     SceneText text;
     text.addList("datasets", scene.datasets, datasetJson);
     text.addList("mesostructure", scene.surfaces, surfaceJson);
-    if (scene.light) {
-        const Json light{{"direction", triple(scene.light->direction)}, {"follows_camera", scene.light->followsCamera}};
-        text.add("lights", Json::array({light}));
+    if (!scene.lights.empty()) {
+        Json lights = Json::array();
+        for (const DirectedLight& light : scene.lights) {
+            Json json{{"direction", triple(light.direction)}, {"follows_camera", light.followsCamera}};
+            if (light.strength != 1) json["strength"] = light.strength;
+            lights.push_back(std::move(json));
+        }
+        text.add("lights", lights);
     }
     if (scene.camera) text.add("camera", Json::parse(cameraToJson(*scene.camera)));
     text.addList("sections", scene.sections, [](const SectionPlane& plane) {

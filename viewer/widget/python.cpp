@@ -68,6 +68,15 @@ vcp_shading shadingNamed(const std::string& name) {
 
 using Plane = std::array<double, 4>;
 
+/// Caps as Python has them: False, True for closed parts, "all".
+py::object capsOf(uint32_t caps) { return caps == 2 ? py::object(py::str("all")) : py::object(py::bool_(caps != 0)); }
+
+uint32_t capsFrom(const py::handle& value) {
+    if (!py::isinstance<py::str>(value)) return value.cast<bool>() ? 1 : 0;
+    if (value.cast<std::string>() != "all") throw py::value_error("caps are True, False or \"all\"");
+    return 2;
+}
+
 py::dict toDict(const vcp_look& look) {
     using namespace py::literals;
     std::vector<Plane> sections;
@@ -81,7 +90,7 @@ py::dict toDict(const vcp_look& look) {
                     "light_in_world"_a = look.light_in_world != 0, "transparent"_a = look.transparent != 0,
                     "background_top"_a = triple(look.background_top),
                     "background_bottom"_a = triple(look.background_bottom), "sections"_a = sections,
-                    "section_caps"_a = look.section_caps != 0, "samples"_a = look.samples);
+                    "section_caps"_a = capsOf(look.section_caps), "samples"_a = look.samples);
 }
 
 void setSections(vcp_look& look, const std::vector<Plane>& planes) {
@@ -118,7 +127,7 @@ vcp_look changed(vcp_look look, const py::kwargs& fields) {
         else if (name == "sections")
             setSections(look, value.cast<std::vector<Plane>>());
         else if (name == "section_caps")
-            look.section_caps = flag();
+            look.section_caps = capsFrom(value);
         else if (name == "samples")
             look.samples = value.cast<uint32_t>();
         else
@@ -282,10 +291,10 @@ void setLines(View& view, const std::vector<LineOf>& lines) {
 
 void setLook(View& view, const py::kwargs& fields) { view.setLook(changed(view.look(), fields)); }
 
-void setSections(View& view, const std::vector<Plane>& planes, bool caps) {
+void setSections(View& view, const std::vector<Plane>& planes, const py::object& caps) {
     vcp_look look = view.look();
     setSections(look, planes);
-    look.section_caps = caps ? 1 : 0;
+    look.section_caps = capsFrom(caps);
     view.setLook(look);
 }
 

@@ -408,12 +408,11 @@ void vcp_view::showScene() {
     camera.up = up;
     camera.look(vcp::View::Fit, scene.bounds(), size.x > 0 && size.y > 0 ? size : kUsualSize);
     viewer->show(scene.placed(), scene.surfaces, scene.file.camera.value_or(camera), context->name);
-    // The light and planes of one scene do not apply to the next.
-    if (std::exchange(hasSceneLight, scene.file.light.has_value()) || hasSceneLight) {
+    viewer->setLooks(looksOf(scene.file));
+    // The lights and planes of one scene do not apply to the next.
+    if (std::exchange(hasSceneLight, !scene.file.lights.empty()) || hasSceneLight) {
         vcp::Shading shading = viewer->shading();
-        const vcp::SceneLight light = scene.file.light.value_or(vcp::SceneLight{true, vcp::Shading{}.lightDirection});
-        shading.lightFollowsCamera = light.followsCamera;
-        shading.lightDirection = light.direction;
+        setLights(shading, scene.file.lights.empty() ? lightsOf(vcp::Shading()) : scene.file.lights);
         viewer->setShading(shading);
     }
     if (std::exchange(hasSceneSections, !scene.file.sections.empty()) || hasSceneSections) {

@@ -255,7 +255,7 @@ void Interface::layOutStatus() {
         if (status.detail == Detail::Settled && status.update.drawable)
             parts.emplace_back(fmt::format("Off by {} px at most", formatPixels(status.update.errorPixels)),
                                palette.dim);
-        const uint32_t most = std::max(viewer.samples(), status.samples);
+        const uint32_t most = std::max(viewer.mostSamples(), status.samples);
         if (most > 1) parts.emplace_back(fmt::format("Samples {} of {}", status.samples, most), palette.dim);
         if (status.reduction > 1)
             parts.emplace_back(fmt::format("1/{} size while moving", status.reduction), palette.dim);

@@ -87,6 +87,7 @@ private:
     void layOutMeasuredLine(size_t number);
     void layOutPoints();
     void layOutLayers();
+    void layOutDataset(uint32_t dataset);
     void layOutSave();
     void layOutDetails();
     void layOutLimits();

@@ -271,10 +271,51 @@ void Interface::layOutMeasuredLine(size_t number) {
         valueRow(*look_, typeset(each.what).c_str(), each.value);
 }
 
+/// A dataset's name and a switch, and below its colour and how much of it is there.
+void Interface::layOutDataset(uint32_t dataset) {
+    const ViewSession::Layer& layer = session_->layers()[dataset];
+    Viewer& viewer = session_->viewer();
+    ImGui::PushID(int(dataset));
+    std::vector<uint32_t> hidden = viewer.hidden();
+    bool isShown = !std::ranges::count(hidden, dataset);
+    const std::string count = formatCount(layer.triangles);
+    const std::string name = fitted(layer.name, ImGui::GetContentRegionAvail().x * 0.45f) + "  " + typeset(count);
+    if (switchRow(*look_, name.c_str(), isShown, {"Show it, or hide it", ""})) {
+        std::erase(hidden, dataset);
+        if (!isShown) hidden.push_back(dataset);
+        viewer.setHidden(std::move(hidden));
+    }
+    DatasetLook look = viewer.lookOf(dataset);
+    glm::vec3 colour = look.colour.value_or(viewer.shading().clay);
+    if (colourEdit("##colour", colour)) {
+        look.colour = colour;
+        viewer.setLook(look);
+    }
+    showTip(*look_, {"A colour in place of its own", ""});
+    ImGui::SameLine();
+    if (look.colour) {
+        if (iconButton(*look_, icon::kDelete, "own", {"Its own colours again", ""}, false, 24)) {
+            look.colour.reset();
+            viewer.setLook(look);
+        }
+        ImGui::SameLine();
+    }
+    float percent = 100 * look.opacity;
+    ImGui::SetNextItemWidth(-1);
+    if (ImGui::SliderFloat("##opacity", &percent, 0, 100, "%.0f %% there", kNoTyping)) {
+        look.opacity = percent / 100;
+        viewer.setLook(look);
+    }
+    showTip(*look_, {"Less than 100: what is behind it shines through", ""});
+    ImGui::PopID();
+}
+
 void Interface::layOutLayers() {
-    for (const ViewSession::Layer& layer : session_->layers())
-        valueRow(*look_, fitted(layer.name, ImGui::GetContentRegionAvail().x * 0.6f).c_str(),
-                 layer.triangles > 0 ? formatCount(layer.triangles) : std::string("relief"));
+    for (size_t i = 0; i < session_->layers().size(); ++i)
+        if (const ViewSession::Layer& layer = session_->layers()[i]; layer.triangles > 0)
+            layOutDataset(uint32_t(i));
+        else
+            valueRow(*look_, fitted(layer.name, ImGui::GetContentRegionAvail().x * 0.6f).c_str(), "relief");
     ImGui::Dummy({0, 0});
     switchRow(*look_, "Boxes of the parts drawn", session_->showsPages,
               {"The parts that the picture is made of: blue is coarse, red is fine", "B"});
@@ -354,7 +395,7 @@ void Interface::layOutDetails() {
         valueRow(*look_, "Read", formatBytes(update.bytesRead));
     }
     if (status.frame.surfaceBytes > 0) valueRow(*look_, "Mesostructure", formatBytes(status.frame.surfaceBytes));
-    const uint32_t most = std::max(session_->viewer().samples(), status.samples);
+    const uint32_t most = std::max(session_->viewer().mostSamples(), status.samples);
     valueRow(*look_, "Samples", fmt::format("{} of {}", status.samples, most));
     valueRow(*look_, "A picture takes", fmt::format("{:.0f} ms", status.frame.msFrame));
     valueRow(*look_, "Size", fmt::format("{} x {}", size.x, size.y));

@@ -8,6 +8,8 @@
 #include <glm/geometric.hpp>
 #include <nlohmann/json.hpp>
 
+#include "viewer/camera/text_file.h"
+
 namespace vcp {
 
 namespace {
@@ -150,6 +152,86 @@ std::string measurementCsv(const Measurement& measurement) {
         }
     }
     return csv;
+}
+
+namespace {
+
+constexpr size_t kLargestFile = 16 << 20;
+constexpr int kDeepest = 8;
+
+/// Says where a text stops being JSON, or nests deeper than measurements do.
+class MeasurementCheck : public nlohmann::detail::json_sax_acceptor<nlohmann::json> {
+public:
+    bool start_object(size_t) { return ++depth_ <= kDeepest; }
+    bool start_array(size_t) { return ++depth_ <= kDeepest; }
+    bool end_object() { return --depth_, true; }
+    bool end_array() { return --depth_, true; }
+
+private:
+    int depth_ = 0;
+};
+
+std::optional<MeasuredPoint> pointFrom(const nlohmann::json& json) {
+    if (!json.is_object() || !json.contains("position")) return std::nullopt;
+    const nlohmann::json& position = json["position"];
+    if (!position.is_array() || position.size() != 3) return std::nullopt;
+    MeasuredPoint point;
+    for (size_t axis = 0; axis < 3; ++axis) {
+        if (!position[axis].is_number() || !std::isfinite(position[axis].get<double>())) return std::nullopt;
+        point.position[int(axis)] = position[axis].get<double>();
+    }
+    const auto error = json.find("error"), level = json.find("level");
+    if (error != json.end() && error->is_number()) point.error = error->get<double>();
+    if (level != json.end() && level->is_number_unsigned()) point.level = level->get<uint32_t>();
+    return point;
+}
+
+}  // namespace
+
+Result<ReadMeasurement> measurementFromJson(const std::string& text, const std::string& name) {
+    const auto wrong = [&](const std::string& what) {
+        return Error{.code = ErrorCode::InvalidInput, .message = what, .file = name};
+    };
+    MeasurementCheck check;
+    const auto json = nlohmann::json::sax_parse(text, &check) ? nlohmann::json::parse(text, nullptr, false)
+                                                              : nlohmann::json(nlohmann::json::value_t::discarded);
+    if (json.is_discarded()) return wrong("not a measurement: the JSON breaks off or goes wrong");
+    if (!json.is_object() || !json.contains("lines") || !json["lines"].is_array())
+        return wrong("not a measurement: \"lines\" is missing");
+    ReadMeasurement read;
+    if (json.contains("unit")) {
+        if (json["unit"].is_string()) read.unit = unitNamed(json["unit"].get<std::string>());
+        if (!read.unit) return wrong("\"unit\" is none of um, mm, cm, m, km, in, ft");
+    }
+    for (size_t i = 0; i < json["lines"].size(); ++i) {
+        const auto& line = json["lines"][i];
+        if (!line.is_object() || !line.contains("points") || !line["points"].is_array())
+            return wrong(fmt::format("line {} has no \"points\"", i + 1));
+        for (size_t k = 0; k < line["points"].size(); ++k) {
+            const auto point = pointFrom(line["points"][k]);
+            if (!point)
+                return wrong(fmt::format("point {} of line {} has no \"position\" of three numbers", k + 1, i + 1));
+            read.measurement.add(*point);
+        }
+        read.measurement.finishLine();
+    }
+    return read;
+}
+
+Result<ReadMeasurement> readMeasurement(const std::filesystem::path& path) {
+    VCP_TRY_ASSIGN(const auto text, readText(path, kLargestFile, "a measurement"));
+    return measurementFromJson(text, path.string());
+}
+
+std::vector<AnnotatedLine> annotatedLines(const Measurement& measurement, const std::optional<LengthUnit>& unit) {
+    std::vector<AnnotatedLine> lines;
+    for (const MeasuredLine& line : measurement.lines()) {
+        AnnotatedLine& annotated = lines.emplace_back();
+        for (const MeasuredPoint& point : line) annotated.points.push_back(point.position);
+        for (size_t i = 0; i + 1 < line.size(); ++i)
+            annotated.lengths.push_back(lengthText(segmentLength(line, i), unit));
+    }
+    return lines;
 }
 
 std::string measurementJson(const Measurement& measurement, const std::optional<LengthUnit>& unit) {

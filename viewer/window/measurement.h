@@ -6,12 +6,15 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include <glm/vec3.hpp>
 
+#include "octree/io/result.h"
+#include "viewer/annotation/annotations.h"
 #include "viewer/annotation/length_unit.h"
 
 namespace vcp {
@@ -70,5 +73,19 @@ std::string measurementCsv(const Measurement& measurement);
 /// Returns {"lines":[{"points":[{"position":[x,y,z],"error":e,"level":n}],"segments":[..],"length":l,"length_error":e,
 /// "angles_degrees":[..]}]}, indented; with "unit" where it is known. All numbers are in the world's unit.
 std::string measurementJson(const Measurement& measurement, const std::optional<LengthUnit>& unit = {});
+
+/// What a file of measurementJson() holds.
+struct ReadMeasurement {
+    Measurement measurement;
+    std::optional<LengthUnit> unit;
+};
+/// Reads such a text; figures that follow from the points are passed over. `name` stands for the file in errors. May be
+/// hostile. Errors: InvalidInput.
+Result<ReadMeasurement> measurementFromJson(const std::string& text, const std::string& name);
+/// Does so with a file of at most 16 MiB. Errors: also Io, Limit.
+Result<ReadMeasurement> readMeasurement(const std::filesystem::path& path);
+
+/// Returns the lines as they are drawn over pictures, each segment with its length.
+std::vector<AnnotatedLine> annotatedLines(const Measurement& measurement, const std::optional<LengthUnit>& unit);
 
 }  // namespace vcp

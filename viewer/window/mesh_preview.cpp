@@ -52,7 +52,8 @@ public:
     /// clay, as meshes without colours are.
     [[nodiscard]] ImU32 lit(uint32_t colour, glm::vec3 normal, glm::vec3 point) const {
         const glm::vec3 ray = isPerspective_ ? point - eye_ : forward_;
-        const float light = f32::encodedLight(glm::dot(normal, ray) > 0 ? -normal : normal, light_, sky_, 1, 1);
+        const glm::vec3 n = glm::dot(normal, ray) > 0 ? -normal : normal;
+        const float light = f32::encodedLight(n, sky_, f32::sunlightOf(n, light_, 1), 1);
         const glm::vec3 own = glm::vec3(colour & 0xffu, colour >> 8 & 0xffu, colour >> 16 & 0xffu) / 255.0f;
         const glm::vec3 shown = glm::clamp(255.0f * light * (colour == kWhite ? clay_ : own), 0.0f, 255.0f);
         return IM_COL32(int(shown.x), int(shown.y), int(shown.z), 255);

@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 #include <glm/common.hpp>
+#include <glm/exponential.hpp>
 
 #include "octree/io/output_file.h"
 #include "viewer/annotation/picture_canvas.h"
@@ -145,14 +146,12 @@ Result<void> ViewSession::show(const OpenedScene& open, const std::vector<std::s
     const bool hasOwnSections = viewer_->sections().empty() && !open.file.sections.empty();
     if (hasOwnSections) viewer_->setSections(open.file.sections);
     viewer_->setSectionCaps(std::max(options_.render.caps, hasOwnSections ? open.file.sectionCaps : Caps::None));
-    if (open.file.light || std::exchange(hasSceneLight_, false)) {
-        // The light of one scene does not apply to the next.
+    if (!open.file.lights.empty() || std::exchange(hasSceneLight_, false)) {
+        // The lights of one scene do not apply to the next.
         Shading shading = viewer_->shading();
-        const Shading& chosen = options_.render.shading;
-        shading.lightFollowsCamera = open.file.light ? open.file.light->followsCamera : chosen.lightFollowsCamera;
-        shading.lightDirection = open.file.light ? open.file.light->direction : chosen.lightDirection;
+        hasSceneLight_ = !open.file.lights.empty();
+        setLights(shading, hasSceneLight_ ? open.file.lights : lightsOf(options_.render.shading));
         viewer_->setShading(shading);
-        hasSceneLight_ = open.file.light.has_value();
     }
     cancelSaving();
     endPick();
@@ -164,6 +163,7 @@ Result<void> ViewSession::show(const OpenedScene& open, const std::vector<std::s
         scans_.push_back({.reader = part.open.reader, .placement = part.placement, .plane = {}, .unit = {}});
     }
     VCP_TRY(viewer_->open(open.placed(), open.surfaces, camera, nameOf(inputs)));
+    viewer_->setLooks(looksOf(open.file));
     if (!open.surfaces.warnings.empty()) note(open.surfaces.warnings.front());
     subject_ = open.legendSubject();
     layers_.clear();
@@ -348,12 +348,17 @@ void ViewSession::saveScene() {
     if (std::ranges::any_of(scene_.datasets, [](const SceneDataset& each) { return each.file.empty(); }))
         return note("several meshes are shown as one: build a .vcp of them, which a scene can name");
     SceneFile scene = scene_;
-    const Shading& shading = viewer_->shading();
-    scene.light = SceneLight{shading.lightFollowsCamera, shading.lightDirection};
+    scene.lights = lightsOf(viewer_->shading());
     scene.camera = viewer_->camera();
     scene.sections = viewer_->sections();
     scene.sectionCaps = viewer_->sectionCaps();
     scene.annotations = points_;
+    for (size_t i = 0; i < scene.datasets.size(); ++i) {
+        const DatasetLook look = viewer_->lookOf(uint32_t(i));
+        scene.datasets[i].opacity = look.opacity;
+        scene.datasets[i].colour.reset();
+        if (look.colour) scene.datasets[i].colour = glm::pow(*look.colour, glm::vec3(1 / 2.2f));
+    }
     const auto nameOf = [](int number) { return fmt::format("scene-{}.json", number); };
     const std::string name = nameOf(freeNumber([&](int i) { return isThere(nameOf(i)); }));
     const auto written = writeFile(name, OutputKind::JsonText, std::string_view(sceneToJson(scene)));
@@ -367,12 +372,7 @@ Annotations ViewSession::annotations() const {
         if (!std::ranges::count(viewer_->hidden(), uint32_t(i))) shown.levels.push_back(subject_.levels[i]);
     Annotations all{
         .legends = legendsOf(viewer_->shading().mode, shown), .hasScaleBar = true, .lines = {}, .unit = unit()};
-    for (const MeasuredLine& line : measurement_.lines()) {
-        AnnotatedLine& annotated = all.lines.emplace_back();
-        for (const MeasuredPoint& point : line) annotated.points.push_back(point.position);
-        for (size_t i = 0; i + 1 < line.size(); ++i)
-            annotated.lengths.push_back(lengthText(segmentLength(line, i), unit()));
-    }
+    all.lines = annotatedLines(measurement_, unit());
     all.points = points_;
     return all;
 }

@@ -153,6 +153,24 @@ TEST(Annotations, ALegendWithoutRoomIsLeftOut) {
     EXPECT_TRUE(drawn(steps(), covered).texts.empty());
 }
 
+TEST(Annotations, ALegendGivesWayToAMeasuredLength) {
+    constexpr glm::uvec2 kSmall(320, 240);
+    Annotations annotations = steps();
+    const auto upperLeftOf = [](const RecordingCanvas& canvas) {
+        return glm::dvec2(std::ranges::min_element(canvas.rectangles, {}, [](const auto& r) { return r.low.x; })->low);
+    };
+    const glm::dvec2 usual = upperLeftOf(drawn(annotations, flat(1, kSmall)));
+    // A length is written where the legend would be: (0, 0) is the picture's middle, y up.
+    const glm::dvec3 place(usual.x - 160 + 20, 120 - usual.y, 0);
+    annotations.lines = {
+        {.points = {place - glm::dvec3(20, 0, 0), place + glm::dvec3(20, 0, 0)}, .lengths = {"40 mm"}}};
+    const RecordingCanvas canvas = drawn(annotations, flat(1, kSmall));
+    EXPECT_LT(upperLeftOf(canvas).y, 120) << "it stands at the upper edge";
+    EXPECT_EQ(upperLeftOf(canvas).x, usual.x);
+    annotations.lines[0].points = {{-150, 100, 0}, {-120, 100, 0}};
+    EXPECT_EQ(upperLeftOf(drawn(annotations, flat(1, kSmall))), usual);
+}
+
 TEST(Annotations, MeasuredLinesAreWhereTheyWereMeasured) {
     const Annotations annotations{
         .legends = {}, .lines = {{.points = {{0, 0, 0}, {100, 0, 0}}, .lengths = {"100 mm"}}}, .unit = {}};

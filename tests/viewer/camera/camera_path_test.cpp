@@ -40,6 +40,38 @@ TEST(CameraPath, ATurntableGoesOnceAround) {
     EXPECT_NEAR(turntable(upward, pivot, 4)[1].position.z, 8, 1e-12);
 }
 
+TEST(CameraPath, ATurntableThatIsFittedSeesAllOfItsBoxEachTime) {
+    constexpr glm::ivec2 kSize(320, 240);
+    // It is narrow from the front and wide from the side.
+    const Box box{{9, 1, -4}, {11, 3, 4}};
+    const auto isInPicture = [&](const OrbitCamera& camera, int i) {
+        const glm::dvec3 corner((i & 1) != 0 ? box.high.x : box.low.x, (i & 2) != 0 ? box.high.y : box.low.y,
+                                (i & 4) != 0 ? box.high.z : box.low.z);
+        const auto pixel = camera.pixelOf(corner, kSize);
+        return pixel && pixel->x >= 0 && pixel->x <= kSize.x && pixel->y >= 0 && pixel->y <= kSize.y;
+    };
+    const auto cornersOutside = [&](const OrbitCamera& first) {
+        int outside = 0;
+        for (const OrbitCamera& camera : turntable(first, box.centre(), 12))
+            for (int i = 0; i < 8; ++i) outside += isInPicture(camera, i) ? 0 : 1;
+        return outside;
+    };
+    for (const Projection projection : {Projection::Perspective, Projection::Orthographic}) {
+        OrbitCamera camera;
+        camera.projection = projection;
+        camera.look(View::Front, box, kSize);
+        EXPECT_GT(cornersOutside(camera), 0);
+        OrbitCamera around = camera;
+        around.fitAround(box, kSize, 12);
+        EXPECT_EQ(cornersOutside(around), 0);
+        EXPECT_EQ(around.orientation, camera.orientation);
+        // It is no farther away than the widest view needs.
+        around.focusDistance *= 0.9;
+        around.position = box.centre() - around.forwardVector() * around.focusDistance;
+        EXPECT_GT(cornersOutside(around), 0);
+    }
+}
+
 TEST(CameraPath, TwoCamerasAreJoinedByAStraightLine) {
     const std::vector<OrbitCamera> keys{lookingAt({0, 0, 5}, {0, 0, 0}), lookingAt({2, 0, 5}, {2, 0, 0})};
     const auto path = cameraPath(keys, 5);

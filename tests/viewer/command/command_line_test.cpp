@@ -614,6 +614,42 @@ TEST_F(CommandLine, ADryRunIsNearWhatTheBuildThenTakes) {
 }
 #endif
 
+TEST_F(CommandLine, AnInputThatFailsDoesNotKeepTheOthersFromBeingDrawn) {
+    const fs::path broken = *folder_ / "broken.vcp", drawn = *folder_ / "drawn";
+    std::ofstream(broken) << "no dataset";
+    const Ran ran = run({"render", broken.string(), dataset().string(), "-o", drawn.string() + "/", "--size", "64x48",
+                         "--device", "host", "--json"});
+    EXPECT_EQ(ran.status, 1);
+    EXPECT_NE(ran.err.find("1 of 2 inputs could not be drawn: " + broken.string()), std::string::npos) << ran.err;
+    EXPECT_TRUE(fs::exists(drawn / (dataset().stem().string() + ".png")));
+    EXPECT_FALSE(fs::exists(drawn / "broken.png"));
+    const Json pictures = Json::parse(ran.out)["pictures"];
+    ASSERT_EQ(pictures.size(), 2u);
+    EXPECT_NE(pictures[0]["error"].get<std::string>().find("broken.vcp"), std::string::npos);
+    EXPECT_EQ(pictures[1]["width"], 64);
+    // An input alone fails with its own error.
+    expectFailure(run({"render", broken.string(), "-o", drawn.string() + "/", "--device", "host"}), 1, "broken.vcp");
+}
+
+TEST_F(CommandLine, MeasurementsAreDrawn) {
+    const fs::path measured = *folder_ / "measurement.json";
+    const auto write = [&](const char* text) { std::ofstream(measured) << text; };
+    write(R"({"unit": "mm", "lines": [{"points": [{"position": [0, 0, 0]}, {"position": [0.5, 0.2, 0]}]}]})");
+    const auto render = [&](const char* name, std::vector<std::string> more) {
+        std::vector<std::string> arguments{"render", dataset().string(), "-o",       (*folder_ / name).string(),
+                                           "--size", "320x240",          "--device", "host"};
+        arguments.insert(arguments.end(), more.begin(), more.end());
+        return run(arguments);
+    };
+    ASSERT_EQ(render("plain.png", {}).status, 0);
+    ASSERT_EQ(render("measured.png", {"--measurement", measured.string()}).status, 0);
+    EXPECT_NE(readPng(*folder_ / "measured.png").value(), readPng(*folder_ / "plain.png").value());
+    expectFailure(render("x.png", {"--measurement", (*folder_ / "none.json").string()}), 1, "none.json");
+    write("{}");
+    expectFailure(render("x.png", {"--measurement", measured.string()}), 1, "\"lines\" is missing");
+    EXPECT_FALSE(fs::exists(*folder_ / "x.png"));
+}
+
 TEST_F(CommandLine, LegendsAndScaleBarsAreWrittenIntoPictures) {
     const auto render = [&](const char* name, std::vector<std::string> more) {
         std::vector<std::string> arguments{"render", dataset().string(), "-o",       (*folder_ / name).string(),

@@ -24,9 +24,10 @@ TEST(SceneFile, TheDocumentsExampleIsRead) {
     const Similarity& turned = scene->datasets[1].placement;
     EXPECT_LT(glm::distance(turned.toWorld({0, 0, 1}), glm::dvec3(0.8, 0, 0)), 1e-15);
     EXPECT_LT(glm::distance(scene->datasets[2].placement.toWorld({1, 2, 3}), glm::dvec3(1, 1.8, 3)), 1e-15);
-    ASSERT_TRUE(scene->light);
-    EXPECT_FALSE(scene->light->followsCamera);
-    EXPECT_NEAR(glm::length(scene->light->direction), 1, 1e-6);
+    ASSERT_EQ(scene->lights.size(), 1u);
+    EXPECT_FALSE(scene->lights[0].followsCamera);
+    EXPECT_NEAR(glm::length(scene->lights[0].direction), 1, 1e-6);
+    EXPECT_EQ(scene->lights[0].strength, 1);
     ASSERT_TRUE(scene->camera);
     EXPECT_EQ(scene->camera->position, glm::dvec3(0, 0.2, 1.5));
     EXPECT_EQ(scene->sections, (std::vector<SectionPlane>{{{1, 0, 0}, 0.05}}));
@@ -46,7 +47,9 @@ TEST(SceneFile, WhatIsWrongIsSaidWithItsLine) {
         {"{\n\"datasets\": []}", 2, "1 to 256"},
         {"{\n\"datasets\":\n[\n{}]}", 4, "\"file\" is missing"},
         {"{\n\"datasets\": [{\"file\": 7}]}", 2, "\"file\""},
-        {inDataset("\"colour\": 1"), 4, "\"colour\" is no key"},
+        {inDataset("\"color\": 1"), 4, "\"color\" is no key"},
+        {inDataset("\"colour\": [1, 0, 2]"), 4, "from 0 to 1"},
+        {inDataset("\"opacity\": 1.5"), 4, "\"opacity\" must be from 0 to 1"},
         {inDataset("\"scale\": [1, 2, 1]"), 4, "not supported"},
         {inDataset("\"scale\": 0"), 4, "above 0"},
         {inDataset("\"scale\": -1"), 4, "above 0"},
@@ -70,7 +73,8 @@ TEST(SceneFile, WhatIsWrongIsSaidWithItsLine) {
         {beside("\"mesostructure\": [{\"asset\": \"beads\",\n\"texture\": 7}]"), 4, "\"texture\""},
         {beside("\"mesostructure\": [{\"asset\": \"beads\",\n\"normal_texture\": \"\"}]"), 4, "\"normal_texture\""},
         {beside("\"mesostructure\": [{\n\"asset\": \"brick\"}]"), 4, "\"asset\" must be"},
-        {beside("\"lights\": [{}, {}]"), 3, "more are not supported"},
+        {beside("\"lights\": [{}, {}, {}, {}, {}]"), 3, "at most 4 lights"},
+        {beside("\"lights\": [{\"direction\": [1, 0, 0], \"strength\": -1}]"), 3, "must be from 0 to 10"},
         {beside("\"lights\": [{}]"), 3, "direction"},
         {beside("\"caps\": 1"), 3, "true or false"},
         {beside("\"camera\": {\"position\": [0, 0, 0],\n \"target\": [0, 0, 0]}"), 4, "\"target\""},
@@ -117,6 +121,8 @@ TEST(SceneFile, WhatIsWrittenIsReadAgain) {
     scene.datasets.push_back(
         {.file = "http://127.0.0.1:1/a.vcp",
          .placement = {glm::angleAxis(0.7, glm::normalize(glm::dvec3(1, 2, -0.5))), 0.125, {483920.25, -3, 1e-9}}});
+    scene.datasets[1].colour = glm::vec3(0.5f, 0.25f, 1);
+    scene.datasets[1].opacity = 0.75f;
     MesoSurfaceDescription& surface = scene.surfaces.emplace_back();
     surface.asset = "beads";
     surface.base = "torus";
@@ -131,7 +137,7 @@ TEST(SceneFile, WhatIsWrittenIsReadAgain) {
     surface.method.cones = {2, 2};
     surface.method.steps = 7;
     surface.withBase = surface.withFar = false;
-    scene.light = SceneLight{.followsCamera = true, .direction = glm::vec3(0.6f, 0, 0.8f)};
+    scene.lights = {{true, glm::vec3(0.6f, 0, 0.8f), 1}, {false, glm::vec3(0, 1, 0), 0.25f}};
     scene.camera = OrbitCamera();
     scene.camera->position = {1, 2, 30};
     scene.sections = {{{0, 0, -2}, -0.25}, {{1, 0.5, 0}, 7}};
@@ -146,10 +152,16 @@ TEST(SceneFile, WhatIsWrittenIsReadAgain) {
         EXPECT_EQ(read->datasets[i].file, scene.datasets[i].file);
         const Similarity &a = read->datasets[i].placement, &b = scene.datasets[i].placement;
         EXPECT_EQ(a.scale, b.scale);
+        EXPECT_EQ(read->datasets[i].colour, scene.datasets[i].colour);
+        EXPECT_EQ(read->datasets[i].opacity, scene.datasets[i].opacity);
         EXPECT_EQ(a.translation, b.translation);
         for (const glm::dvec3 axis : {glm::dvec3(1, 0, 0), glm::dvec3(0, 1, 0)})
             expectNear(a.rotation * axis, b.rotation * axis);
     }
+    const std::vector<DatasetLook> looks = looksOf(*read);
+    ASSERT_EQ(looks.size(), 1u) << "the first dataset is shown as it is";
+    EXPECT_EQ(looks[0].dataset, 1u);
+    EXPECT_NEAR(looks[0].colour->g, std::pow(0.25, 2.2), 1e-6);
     ASSERT_EQ(read->surfaces.size(), 1u);
     EXPECT_EQ(read->surfaces[0].asset, "beads");
     EXPECT_EQ(read->surfaces[0].base, "torus");
@@ -164,9 +176,12 @@ TEST(SceneFile, WhatIsWrittenIsReadAgain) {
     EXPECT_EQ(read->surfaces[0].method.cones.count(), 4);
     EXPECT_EQ(read->surfaces[0].method.steps, 7);
     EXPECT_FALSE(read->surfaces[0].withBase || read->surfaces[0].withFar);
-    ASSERT_TRUE(read->light && read->camera);
-    EXPECT_TRUE(read->light->followsCamera);
-    EXPECT_LT(glm::distance(read->light->direction, scene.light->direction), 1e-6f);
+    ASSERT_TRUE(read->lights.size() == 2 && read->camera);
+    for (size_t i = 0; i < 2; ++i) {
+        EXPECT_EQ(read->lights[i].followsCamera, i == 0);
+        EXPECT_LT(glm::distance(read->lights[i].direction, scene.lights[i].direction), 1e-6f);
+        EXPECT_EQ(read->lights[i].strength, scene.lights[i].strength);
+    }
     expectNear(read->camera->position, scene.camera->position);
     EXPECT_EQ(read->sections, scene.sections);
     EXPECT_EQ(read->sectionCaps, Caps::All);

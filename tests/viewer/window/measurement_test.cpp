@@ -91,6 +91,39 @@ TEST(Measurement, JsonGivesBackEveryBit) {
     EXPECT_EQ(angled["lines"][0]["points"][2]["level"], 4);
 }
 
+TEST(Measurement, AFileGivesBackWhatWasMeasured) {
+    Measurement measurement = rightAngle();
+    measurement.add({{450000.12345678901, -1.0 / 3, 1e-300}, 0.1, 3});
+    const auto read = measurementFromJson(measurementJson(measurement, unitNamed("mm")), "m.json");
+    ASSERT_TRUE(read) << read.error().line();
+    EXPECT_EQ(read->unit, unitNamed("mm"));
+    EXPECT_EQ(measurementJson(read->measurement, read->unit), measurementJson(measurement, unitNamed("mm")));
+    const auto lines = annotatedLines(read->measurement, read->unit);
+    ASSERT_EQ(lines.size(), measurement.lines().size());
+    EXPECT_EQ(lines[0].lengths.size() + 1, lines[0].points.size());
+    EXPECT_EQ(lines[0].lengths[0], lengthText(segmentLength(measurement.lines()[0], 0), unitNamed("mm")));
+}
+
+TEST(Measurement, FilesThatAreNoneAreRefused) {
+    const std::pair<const char*, const char*> wrong[] = {
+        {"", "breaks off"},
+        {"{\"lines\": [", "breaks off"},
+        {"[1]", "\"lines\" is missing"},
+        {"{\"lines\": 3}", "\"lines\" is missing"},
+        {"{\"lines\": [{}]}", "line 1 has no \"points\""},
+        {"{\"lines\": [{\"points\": [{\"position\": [1, 2]}]}]}", "point 1 of line 1"},
+        {"{\"lines\": [{\"points\": [{\"position\": [1, 2, \"x\"]}]}]}", "point 1 of line 1"},
+        {"{\"unit\": \"ell\", \"lines\": []}", "\"unit\" is none of"},
+    };
+    for (const auto& [text, what] : wrong) {
+        const auto read = measurementFromJson(text, "m.json");
+        ASSERT_FALSE(read) << text;
+        EXPECT_NE(read.error().line().find(what), std::string::npos) << read.error().line();
+        EXPECT_NE(read.error().line().find("m.json"), std::string::npos);
+    }
+    EXPECT_FALSE(measurementFromJson(std::string(100000, '['), "m.json"));
+}
+
 TEST(Measurement, TextShowsTheDigitsThatTheErrorLeaves) {
     const std::string text = measurementText(rightAngle());
     EXPECT_NE(text.find("450003.0000  5200000.0000"), std::string::npos) << text;

@@ -19,6 +19,7 @@ class MeshPreviewTest : public testing::Test {
 protected:
     void SetUp() override {
         ImGui::CreateContext();
+        ImGui::GetIO().IniFilename = nullptr;  // it would be written where the test runs
         ImGui::GetIO().DisplaySize = {float(kSize.x), float(kSize.y)};
         unsigned char* texels = nullptr;
         int width = 0, height = 0;

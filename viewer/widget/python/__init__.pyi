@@ -12,6 +12,7 @@ Plane = Sequence[float]  # a, b, c, d: what has a x + b y + c z >= d is kept
 Colour = Sequence[float]  # red, green, blue, opacity, 0 to 1
 Line = Tuple[Sequence[Point], Colour, float]  # points, colour, width in pixels
 Matrix = Sequence[float]  # 16 numbers, row by row
+Caps = Union[bool, str]  # True: of closed parts; "all"
 Path = Union[str, Sequence[Tuple[str, Optional[Matrix]]]]
 
 __version__: str
@@ -50,7 +51,7 @@ class Look(TypedDict):
     background_top: Triple
     background_bottom: Triple
     sections: List[List[float]]
-    section_caps: bool
+    section_caps: Caps
     samples: int
 
 class Pick(TypedDict):
@@ -124,9 +125,9 @@ class View:
     def set_look(self, *, shading: str = ..., error_pixels: float = ..., shadows: bool = ..., occlusion_rays: int = ...,
                  occlusion_radius: float = ..., light: Point = ..., light_in_world: bool = ..., transparent: bool = ...,
                  background_top: Point = ..., background_bottom: Point = ..., sections: Sequence[Plane] = ...,
-                 section_caps: bool = ..., samples: int = ...) -> None: ...
+                 section_caps: Caps = ..., samples: int = ...) -> None: ...
     def set_light(self, direction: Point, in_world: bool = False) -> None: ...
-    def set_sections(self, planes: Sequence[Plane], caps: bool = False) -> None: ...
+    def set_sections(self, planes: Sequence[Plane], caps: Caps = False) -> None: ...
     def set_lines(self, lines: Sequence[Line]) -> None: ...
     def set_visible(self, dataset: int, visible: bool) -> None: ...
     def is_visible(self, dataset: int) -> bool: ...
