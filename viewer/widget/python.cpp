@@ -343,8 +343,8 @@ void bindLook(py::class_<View>& view) {
         .def("set_look", setLook, "What `look` has, by name; the rest stays.")
         .def("set_light", setLight, "direction"_a, "in_world"_a = false,
              "Towards the light: right, up, back of the camera, or x, y, z of the world.")
-        .def("set_sections", py::overload_cast<View&, const std::vector<Plane>&, bool>(setSections), "planes"_a,
-             "caps"_a = false, "Keeps what has a x + b y + c z >= d of each plane (a, b, c, d).")
+        .def("set_sections", py::overload_cast<View&, const std::vector<Plane>&, const py::object&>(setSections),
+             "planes"_a, "caps"_a = false, "Keeps what has a x + b y + c z >= d of each plane (a, b, c, d).")
         .def("set_lines", setLines, "lines"_a,
              "Paints lines over pictures: [(points, (r, g, b, opacity), width), ...].")
         .def("set_visible", &View::setVisible, "dataset"_a, "visible"_a)
