@@ -58,8 +58,8 @@ Result<std::vector<PlacedResidency>> openResidencies(const PageMemorySource& mem
                                     : 0;
         if (needed > options.ramBytes)
             return Error{.code = ErrorCode::Limit,
-                         .message = fmt::format("reading the coarsest page takes {} bytes of memory, more than the {} "
-                                                "bytes allowed for pages on their way: allow more",
+                         .message = fmt::format("reading the coarsest page takes {} bytes, more than the {} of "
+                                                "memory for pages on their way: allow more",
                                                 needed, options.ramBytes),
                          .file = one.source->name()};
         if (options.loaderThreads == 0) all.loader.threads = std::max(all.loader.threads, one.loaderThreads);
