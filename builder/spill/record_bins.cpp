@@ -267,19 +267,18 @@ uint64_t RawBins::total() const {
 }
 
 Result<void> RawBins::read(const Block& block, std::byte* out) const {
-    std::vector<std::byte> coded(block.end - block.offset);
-    VCP_TRY(file_.read(block.offset, coded));
     BlockHeader header;
-    std::memcpy(&header, coded.data(), sizeof header);
-    const std::span<const std::byte> payload = std::span<const std::byte>(coded).subspan(sizeof header);
+    VCP_TRY(file_.read(block.offset, std::as_writable_bytes(std::span(&header, 1))));
+    // What is not coded is read to where it goes.
+    const bool plain = isPlain(block.records, block.storedBytes);
+    std::vector<std::byte> coded(plain ? 0 : block.storedBytes);
+    const std::span<std::byte> payload = plain ? std::span(out, block.storedBytes) : std::span(coded);
+    VCP_TRY(file_.read(block.offset + sizeof header, payload));
     const bool isIntact = header.records == block.records && header.storedBytes == block.storedBytes &&
                           header.hash == header.hashOfHeader() &&
                           header.payloadHash == XXH3_64bits(payload.data(), payload.size());
-    if (isIntact && isPlain(header.records, header.storedBytes)) {
-        std::memcpy(out, payload.data(), payload.size());
-        return {};
-    }
-    std::vector<std::byte> planes(block.records * recordBytes_);
+    if (isIntact && plain) return {};
+    std::vector<std::byte> planes(isIntact ? block.records * recordBytes_ : 0);
     if (!isIntact || ZSTD_decompress(planes.data(), planes.size(), payload.data(), payload.size()) != planes.size())
         return damagedTempFile(file_.path(), block.offset);
     fromPlanes(planes.data(), block.records, recordBytes_, out);
