@@ -85,6 +85,61 @@ private:
     bool ok_ = true;
 };
 
+void writeMap(const GdmMap& map, Out& o) {
+    const DistanceTable& t = map.table;
+    o.one(t.nodes), o.one(t.directions.thetas), o.one(t.directions.phis), o.one(t.unit);
+    o.one(uint32_t(map.factors ? map.factors->rank : 0)), o.one(uint32_t(map.bits)),
+        o.one(uint32_t(map.withVisibility));
+    o.one(map.factors ? map.factors->unit : 0.0f);
+    if (map.factors)
+        o.all(map.factors->weights), o.all(map.factors->eigen);
+    else
+        o.all(t.steps);
+    if (map.withVisibility) o.all(t.hits);
+    o.all(map.properties.texels);
+}
+
+/// Reads a displacement map of a whole slab. Sizes follow from its counts, and are those of the chunk.
+void readMap(In& in, glm::dvec3 extent, GdmMap& map) {
+    const auto points = in.one<glm::ivec3>();
+    DirectionGrid directions;
+    directions.thetas = in.one<int>(), directions.phis = in.one<int>();
+    const auto unit = in.one<float>();
+    const auto rank = in.one<uint32_t>(), bits = in.one<uint32_t>(), withVisibility = in.one<uint32_t>();
+    const auto factorUnit = in.one<float>();
+    for (int axis = 0; axis < 3; ++axis) in.require(points[axis] >= 2 && points[axis] <= kMostNodes);
+    in.require(directions.thetas >= 2 && directions.thetas <= 64 && directions.phis >= 4 && directions.phis <= 64);
+    in.require(unit > 0 && unit <= 1 && std::abs(factorUnit) <= 1);
+    in.require(rank <= uint32_t(kMostRank) && rank % 4 == 0 && (bits == 8 || bits == 16) && withVisibility <= 1);
+    if (!in.ok()) return;
+    map.table = DistanceTable{points, directions, extent, unit, {}, {}};
+    map.bits = int(bits), map.withVisibility = withVisibility == 1;
+    const uint64_t rows = map.table.rows(), columns = map.table.columns(), words = uint64_t(rank / 4) * (bits / 8);
+    if (rank == 0) {
+        map.table.steps = in.all<uint16_t>(rows * columns);
+    } else {
+        map.factors = PackedFactors{rows, columns, int(rank), int(bits), factorUnit, {}, {}};
+        map.factors->weights = in.all<uint32_t>(rows * words), map.factors->eigen = in.all<uint32_t>(columns * words);
+    }
+    if (map.withVisibility) map.table.hits = in.all<uint32_t>(rows * map.table.hitWords());
+    map.properties = {points, extent, in.all<uint32_t>(uint64_t(points.x) * uint64_t(points.y) * uint64_t(points.z))};
+}
+
+void readGuesses(In& in, SafeFactors& f) {
+    f.cells = in.one<glm::ivec3>();
+    f.azimuths = in.one<int>(), f.elevations = in.one<int>(), f.quads = in.one<int>(), f.clusters = in.one<int>();
+    f.unit = in.one<float>(), f.product = in.one<float>();
+    for (int axis = 0; axis < 3; ++axis) in.require(f.cells[axis] >= 1 && f.cells[axis] <= kMaxGridEdge);
+    in.require(f.azimuths >= 1 && f.azimuths <= kMostAzimuths && f.elevations >= 1 && f.elevations <= kMostElevations);
+    in.require(f.quads >= 1 && f.quads <= 4 && f.clusters >= 1 && f.clusters <= 256);
+    in.require(f.unit >= 0 && f.unit <= 16 && f.product >= 0 && f.product <= 16);
+    if (!in.ok()) return;
+    f.rows = in.all<uint32_t>(4 * uint64_t(f.quads) * f.rowCount());
+    f.columns = in.all<uint32_t>(4 * uint64_t(f.quads) * uint64_t(f.clusters) * f.columnCount());
+    if (!in.ok()) return;
+    for (size_t row = 0; row < f.rowCount(); ++row) in.require(f.rows[4 * row + 3] >> 16 < uint32_t(f.clusters));
+}
+
 std::vector<std::pair<ChunkKind, Bytes>> chunksOf(const Asset& a) {
     std::vector<std::pair<ChunkKind, Bytes>> chunks;
     const auto add = [&](ChunkKind kind, const auto& write) {
@@ -117,6 +172,13 @@ std::vector<std::pair<ChunkKind, Bytes>> chunksOf(const Asset& a) {
             o.grid(p.grid), o.one(uint32_t(p.ranks.size())), o.one(uint32_t(p.rows.size())),
                 o.one(uint32_t(p.patches.size())), o.one(p.cellsWithout);
             o.all(p.ranks), o.all(p.rows), o.all(p.patches);
+        });
+    if (a.gdm) add(ChunkKind::Displacement, [&](Out& o) { writeMap(*a.gdm, o); });
+    if (a.guesses)
+        add(ChunkKind::Guesses, [&](Out& o) {
+            const SafeFactors& f = *a.guesses;
+            o.one(f.cells), o.one(f.azimuths), o.one(f.elevations), o.one(f.quads), o.one(f.clusters), o.one(f.unit),
+                o.one(f.product), o.all(f.rows), o.all(f.columns);
         });
     return chunks;
 }
@@ -214,6 +276,12 @@ bool readChunk(ChunkKind kind, In& in, Asset& a) {
             in.require(in.ok() && arePatchesSound(*a.patches));
             break;
         }
+        case ChunkKind::Displacement:
+            readMap(in, extent, a.gdm.emplace());
+            break;
+        case ChunkKind::Guesses:
+            readGuesses(in, a.guesses.emplace());
+            break;
         default:
             return false;
     }
@@ -230,6 +298,7 @@ bool belongTogether(Asset& a) {
         if (grid != nullptr && grid->cells != cells) return false;
     if (a.occupancy && a.heights && (a.heights->size.x % cells.x != 0 || a.heights->size.y % cells.y != 0))
         return false;
+    if (a.guesses && a.guesses->cells != cells) return false;
     if (a.occupancy && a.field && a.field->grid.cells % cells != glm::ivec3(0)) return false;
     const auto agrees = [&](size_t i, bool marked) {
         return marked == (a.occupancy->cells[i % a.occupancy->cells.size()] != 0);
@@ -294,6 +363,15 @@ Result<void> buildAsset(Asset& asset, const AssetOptions& options) {
         VCP_TRY_ASSIGN(asset.compressed, compressMap(*asset.distances, asset.factors));
     }
     if (options.withBoxes) asset.boxes = buildOctantBoxes(*asset.occupancy);
+    if (options.withGuesses) {
+        VCP_TRY_ASSIGN(asset.guesses, buildGuesses(*asset.occupancy, options.guesses));
+    }
+    if (options.gdm) {
+        VCP_TRY_ASSIGN(auto table, traceTable(asset, *shape, options.gdm->traced));
+        VCP_TRY_ASSIGN(auto properties, sampleProperties(*shape, options.gdm->traced.points));
+        VCP_TRY_ASSIGN(asset.gdm, packMap(std::move(table), options.gdm->rank, options.gdm->bits,
+                                          options.gdm->withVisibility, std::move(properties)));
+    }
     if (!options.withPatches) return {};
     VCP_TRY_ASSIGN(asset.patches, buildPatches(*shape, *asset.occupancy, options.crossings));
     return {};
@@ -412,7 +490,7 @@ Result<Asset> parseAsset(std::span<const std::byte> bytes, const std::string& na
         if (hashBytes(content) != chunk.hash)
             return fail("chunk", chunk.offset, "hash does not match: the file was changed or damaged");
         const auto kind = uint32_t(chunk.kind);
-        if (kind >= 64 || kind == 0 || kind > uint32_t(ChunkKind::Compressed))
+        if (kind >= 64 || kind == 0 || kind > uint32_t(ChunkKind::Guesses))
             return Error{.code = ErrorCode::Unsupported,
                          .message = fmt::format("chunk kind {} is not known: use a newer program", kind),
                          .file = name,

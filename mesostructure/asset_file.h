@@ -36,6 +36,11 @@ enum class ChunkKind : uint32_t {
     Boxes = 7,       ///< OctantBoxes: grid, u16 boxes
     Patches = 8,     ///< PatchSet: grid, 3 x u32 counts, u32 cells without, ranks, rows, patches
     Compressed = 9,  ///< i32 number of factors and the factors; made again from Distances on reading
+    /// GdmMap: 3 x i32 points, 2 x i32 directions, f32 unit, u32 rank (0: the table), u32 bits, u32 with visibility,
+    /// f32 unit of the factors; u16 steps, or u32 weights and eigen-maps; u32 hits; u32 properties
+    Displacement = 10,
+    /// SafeFactors: grid, i32 azimuths, elevations, quads, clusters, f32 unit, product, u32 rows, columns
+    Guesses = 11,
 };
 
 struct AssetHeader {
@@ -86,6 +91,8 @@ struct Asset {
     std::optional<CompressedMap> compressed;
     std::optional<OctantBoxes> boxes;
     std::optional<PatchSet> patches;
+    std::optional<GdmMap> gdm;
+    std::optional<SafeFactors> guesses;
 };
 
 /// Returns the asset's shape, which refers to the asset. Errors: as the shapes'.
@@ -99,6 +106,16 @@ struct AssetOptions {
     std::vector<int> factors = {4};
     CrossingRule crossings = CrossingRule::Direct;
     bool withBoxes = true, withPatches = true;
+    bool withGuesses = false;  ///< for gdm-safe
+    SafeOptions guesses = {};
+
+    /// A displacement map, where there is to be one.
+    struct Displacement {
+        GdmOptions traced;
+        int rank = 16, bits = 16;
+        bool withVisibility = true;
+    };
+    std::optional<Displacement> gdm = std::nullopt;
 };
 
 /// Returns cells that suit an asset, where `asked` is 0.

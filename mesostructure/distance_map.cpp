@@ -4,9 +4,12 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <optional>
 
 #include <fmt/format.h>
 #include <glm/geometric.hpp>
+
+#include "mesostructure/gdm/beam_lengths.h"
 
 namespace vcp::meso {
 
@@ -232,6 +235,14 @@ std::vector<Offset> offsetsInCone(const TileGrid& grid, Cones cones, int cone, d
     return offsets;
 }
 
+/// Finds the lengths of cones that are narrow enough to be followed layer by layer.
+std::vector<float> beamDistances(const BeamGrid& beams, Cones cones, int cone, double cap, size_t cells) {
+    std::vector<float> lengths(cells);
+    beams.lengths(beamOf(cones.azimuth, cones.elevation, cone % cones.azimuth, cone / cones.azimuth, kConeSlack), cap,
+                  lengths);
+    return lengths;
+}
+
 std::vector<float> searchedDistances(const Occupancy& occupancy, Cones cones, int cone, double cap) {
     const TileGrid& grid = occupancy.grid;
     const std::vector<Offset> offsets = offsetsInCone(grid, cones, cone, cap);
@@ -300,9 +311,16 @@ Result<DistanceMap> buildDistanceMap(const Occupancy& occupancy, const DistanceO
     if (options.rule != DistanceRule::AnyPoint) {
         VCP_TRY_ASSIGN(fine, occupy(*shape, grid.cells * options.refine));
     }
+    // Rectangles are drawn in by half of what cells are widened by.
+    std::optional<BeamGrid> beams;
+    if (options.rule == DistanceRule::AnyPoint && !options.search &&
+        areBeams(options.cones.azimuth, options.cones.elevation))
+        beams.emplace(grid.cells, grid.cell, occupancy.cells, 0.5 * kCellSlack);
     for (int cone = 0; cone < options.cones.count(); ++cone) {
         std::vector<float> lengths;
-        if (options.rule != DistanceRule::AnyPoint) {
+        if (beams) {
+            lengths = beamDistances(*beams, options.cones, cone, options.cap, grid.count());
+        } else if (options.rule != DistanceRule::AnyPoint) {
             // Both centres are off by half a diagonal.
             const double subtract = options.rule == DistanceRule::PaperSafe ? glm::length(fine.grid.cell) : 0;
             lengths = leastOfFine(grid, fine, signOf(options.cones, cone), options.refine, subtract);

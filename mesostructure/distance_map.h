@@ -11,8 +11,9 @@
 // {1, 2, 4}, n in {1, 2}: octants, quadrants and halves) the pairs are those of cells ordered by index along these
 // axes, the square of the gap is a sum over the axes, and its least value is three one-sided lower envelopes of
 // parabolas, one axis after the other: exact, in time linear in the cells (after Felzenszwalb and Huttenlocher 2012,
-// one-sided). Other cones are searched cell by cell in the order of distance, up to `cap`; they are widened by
-// kConeSlack for the rounding of a ray's cone.
+// one-sided). Narrow cones, from 8 x 4 on, are followed layer by layer (mesostructure/gdm/beam_lengths.h), to at most a
+// cell less than the least distance. Other cones are searched cell by cell in the order of distance, up to `cap`; they
+// are widened by kConeSlack for the rounding of a ray's cone.
 //
 // Lengths above the cap are cut to it (an empty cone has no least distance on a repeated tile), and values are rounded
 // down to a byte. Whether a cell is occupied is a byte of its own, kOccupied: 0 is a length, not a flag.

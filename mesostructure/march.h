@@ -22,6 +22,7 @@
 #include <glm/vec3.hpp>
 
 #include "mesostructure/compressed_map.h"
+#include "mesostructure/gdm_map.h"
 #include "mesostructure/octant_boxes.h"
 #include "mesostructure/patches.h"
 #include "mesostructure/sampled_field.h"
@@ -62,6 +63,8 @@ struct Skipping {
     const DistanceMap* distances = nullptr;
     const CompressedMap* compressed = nullptr;
     const OctantBoxes* boxes = nullptr;
+    const SafeFactors* guesses = nullptr;  ///< beside boxes, of the same cells
+    int mostGuesses = 1;                   ///< of a ray
 };
 
 /// What a walk does in an occupied cell; none: the cell itself is the hit, where the ray enters it.
@@ -119,6 +122,11 @@ struct SphereMap {
 /// Builds the map. Errors: Usage (no cells, too many).
 Result<SphereMap> buildSphereMap(const Shape& shape, const SphereOptions& options);
 std::unique_ptr<Marcher> sphereMarcher(const SphereMap& map);
+
+/// Makes marchers of displacement maps and of slices (mesostructure/shared/march_gdm.h). No bound holds. Errors: Limit
+/// (8 GiB).
+Result<std::unique_ptr<Marcher>> gdmMarcher(const GdmMap& map);
+std::unique_ptr<Marcher> slicesMarcher(const PropertyVolume& volume);
 
 /// Traces in double precision, with no skipping and every cell solved: the truth about a method's own stored data. Its
 /// walk is its own, and shares no code with the marchers'.

@@ -83,12 +83,46 @@ void addCompressed(const CompressedMap& map, MarchArrays& arrays) {
     }
 }
 
+/// Appends groups of four words and returns the first group's number.
+uint32_t addQuads(const std::vector<uint32_t>& values, std::vector<uint32_t>& words) {
+    align(words);
+    return add(values, words) / 4;
+}
+
+void addGuesses(const SafeFactors& factors, int most, MarchArrays& arrays) {
+    MesoRecord& record = arrays.record;
+    arrays.constants.skip = kMesoGuess;
+    addCones({factors.azimuths, factors.elevations}, record);
+    record.unit = factors.unit, record.product = factors.product;
+    record.levelCount = factors.quads, record.clusters = factors.clusters;
+    record.columnCount = int(factors.columnCount());
+    record.guesses = most;
+    record.guessRows = addQuads(factors.rows, arrays.words);
+    record.guessColumns = addQuads(factors.columns, arrays.words);
+}
+
+void addProperties(const PropertyVolume& volume, MarchArrays& arrays) {
+    setExtent(volume.extent, arrays);
+    arrays.record.volume = volume.points;
+    arrays.record.cells = volume.points;
+    arrays.record.cell = volume.extent / glm::dvec3(volume.points);
+    arrays.record.patches = add(volume.texels, arrays.words);
+}
+
+/// Returns the table's values in bytes, rounded.
+std::vector<uint8_t> inBytes(const DistanceTable& table) {
+    std::vector<uint8_t> bytes(table.steps.size());
+    for (size_t i = 0; i < bytes.size(); ++i) bytes[i] = uint8_t((table.steps[i] + 128) / 257);
+    return bytes;
+}
+
 void addSkipping(const Skipping& skipping, MarchArrays& arrays) {
     MesoRecord& record = arrays.record;
     if (skipping.boxes != nullptr) {
         arrays.constants.skip = kMesoBoxes;
         addGrid(skipping.boxes->grid, arrays);
         record.skipping = add(skipping.boxes->boxes, arrays.words);
+        if (skipping.guesses != nullptr) addGuesses(*skipping.guesses, skipping.mostGuesses, arrays);
     } else if (skipping.compressed != nullptr) {
         arrays.constants.skip = kMesoCompressed;
         addGrid(skipping.compressed->grid, arrays);
@@ -186,6 +220,42 @@ MarchArrays sphereArrays(const SphereMap& map) {
     arrays.record.mostSteps = map.options.steps;
     arrays.record.step = map.cap / 32767;
     arrays.record.data = add(map.steps, arrays.words);
+    align(arrays.words);
+    return arrays;
+}
+
+Result<MarchArrays> gdmArrays(const GdmMap& map) {
+    MarchArrays arrays;
+    MesoRecord& record = arrays.record;
+    const DistanceTable& table = map.table;
+    arrays.constants = {.walk = table.isOfTop() ? kMesoVdm : kMesoGdm,
+                        .skip = map.factors ? kMesoFactored : kMesoTable,
+                        .surface = map.withVisibility ? kMesoVisibilityBit : kMesoDensity};
+    addProperties(map.properties, arrays);
+    record.fine = table.nodes;
+    record.elevations = table.directions.thetas, record.azimuths = table.directions.phis;
+    record.cellCount = int(table.rows()), record.columnCount = int(table.columns());
+    record.valueBits = map.bits;
+    if (map.factors) {
+        record.levelCount = map.factors->rank / 4;
+        record.step = map.factors->unit;
+        record.data = add(map.factors->weights, arrays.words);
+        record.rows = add(map.factors->eigen, arrays.words);
+    } else {
+        record.step = map.bits == 8 ? table.unit * 257 : table.unit;
+        record.data = map.bits == 8 ? add(inBytes(table), arrays.words) : add(table.steps, arrays.words);
+    }
+    if (map.withVisibility) record.skipping = add(table.hits, arrays.words);
+    align(arrays.words);
+    if (arrays.words.size() >= size_t{1} << 31)
+        return Error{.code = ErrorCode::Limit, .message = "mesostructure arrays above 8 GiB"};
+    return arrays;
+}
+
+MarchArrays slicesArrays(const PropertyVolume& volume) {
+    MarchArrays arrays;
+    arrays.constants.walk = kMesoSlices;
+    addProperties(volume, arrays);
     align(arrays.words);
     return arrays;
 }

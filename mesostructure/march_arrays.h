@@ -24,12 +24,14 @@ struct MarchArrays {
     std::vector<uint32_t> words;  ///< a multiple of 4
 };
 
-/// These pack arrays. They are pure; what they are given is not referred to afterwards. Errors of gridArrays: Limit
-/// (2^31 words). Precondition: what gridMarcher checks.
+/// These pack arrays. They are pure; what they are given is not referred to afterwards. Errors of gridArrays and
+/// gdmArrays: Limit (2^31 words). Precondition: what gridMarcher checks.
 Result<MarchArrays> gridArrays(const Skipping& skipping, const Surface& surface);
 MarchArrays reliefArrays(const HeightMap& map, const ReliefOptions& options);
 MarchArrays pyramidArrays(const HeightMap& map);
 MarchArrays sphereArrays(const SphereMap& map);
+Result<MarchArrays> gdmArrays(const GdmMap& map);
+MarchArrays slicesArrays(const PropertyVolume& volume);
 
 /// Returns a ray as marchers take it: moved into the first tile, in single precision.
 f32::MesoRay rayInTile(const MarchRay& ray, const MarchArrays& arrays);

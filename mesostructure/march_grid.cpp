@@ -15,7 +15,8 @@ const TileGrid& gridOf(const Skipping& skipping) {
 uint64_t bytesOf(const Skipping& skipping) {
     if (skipping.distances != nullptr) return skipping.distances->bytes();
     if (skipping.compressed != nullptr) return skipping.compressed->bytes();
-    if (skipping.boxes != nullptr) return skipping.boxes->bytes();
+    if (skipping.boxes != nullptr)
+        return skipping.boxes->bytes() + (skipping.guesses != nullptr ? skipping.guesses->bytes() : 0);
     return (skipping.occupancy->cells.size() + 7) / 8;
 }
 
@@ -34,6 +35,8 @@ Result<void> check(const Skipping& skipping, const Surface& surface) {
     if ((surface.patches != nullptr) + (surface.heights != nullptr) + (surface.field != nullptr) > 1)
         return fail("a walk has one surface");
     const glm::ivec3 cells = gridOf(skipping).cells;
+    if (skipping.guesses != nullptr && (skipping.boxes == nullptr || skipping.guesses->cells != cells))
+        return fail("guesses are of the same cells as boxes");
     if (surface.patches != nullptr && surface.patches->grid.cells != cells)
         return fail("the patches are of another grid");
     if (surface.heights != nullptr && surface.heights->size % glm::ivec2(cells) != glm::ivec2(0))

@@ -41,8 +41,8 @@ inline float floor(float x) {
 inline glm::vec3 floor(glm::vec3 v) { return {floor(v.x), floor(v.y), floor(v.z)}; }
 
 #include "mesostructure/shared/march_layout.h"
-static_assert(sizeof(MesoRecord) == 144 + 16 * (kMesoMaxLevels + kMesoMostBorders) &&
-              offsetof(MesoRecord, levels) == 144);
+static_assert(sizeof(MesoRecord) == 176 + 16 * (kMesoMaxLevels + kMesoMostBorders) &&
+              offsetof(MesoRecord, levels) == 176);
 
 #include "mesostructure/shared/shell_layout.h"
 
@@ -68,6 +68,7 @@ struct ArrayMarch {
 #include "mesostructure/shared/march.h"
 #include "mesostructure/shared/march_cells.h"
 #include "mesostructure/shared/march_data.h"
+#include "mesostructure/shared/march_gdm.h"
 };
 
 /// Finds cones among borders that are in no record.

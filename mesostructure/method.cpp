@@ -11,7 +11,7 @@ namespace vcp::meso {
 
 namespace {
 
-constexpr std::array<std::string_view, 13> kNames = {"relief-linear",
+constexpr std::array<std::string_view, 18> kNames = {"relief-linear",
                                                      "relief-binary",
                                                      "relief-secant",
                                                      "relief-secant-printed",
@@ -23,10 +23,15 @@ constexpr std::array<std::string_view, 13> kNames = {"relief-linear",
                                                      "ddm-quadric",
                                                      "ddm-quadric-fitted",
                                                      "boxes",
-                                                     "cells"};
+                                                     "cells",
+                                                     "gdm",
+                                                     "gdm-visibility",
+                                                     "gdm-safe",
+                                                     "vdm",
+                                                     "slices"};
 constexpr std::array<Refinement, 5> kRefinements = {Refinement::None, Refinement::Binary, Refinement::Secant,
                                                     Refinement::SecantAsPrinted, Refinement::Illinois};
-constexpr int kDefaultCells = 64;
+constexpr int kDefaultCells = 64, kDefaultPoints = 32;
 
 template <class T>
 Result<void> take(Result<T> made, std::unique_ptr<T>& to) {
@@ -64,19 +69,65 @@ Result<void> addCells(Method& method, const Asset& asset, const Shape& shape, gl
     return {};
 }
 
+/// Returns the points of a map or of slices: as many along z as the slab is high, and one more, but not fewer than 4.
+glm::ivec3 pointsOf(glm::dvec3 extent, const MethodOptions& options) {
+    const int n = options.cells != 0 ? options.cells : kDefaultPoints;
+    const int layers = options.layers != 0 ? options.layers : std::clamp(int(std::lround(n * extent.z)) + 1, 4, 512);
+    return {n, std::max(2, int(std::lround(n * extent.y))), layers};
+}
+
+/// Returns the asset's map where it is what is asked for; any map of the asset's where no size is.
+const GdmMap* storedMap(const Asset& asset, const GdmOptions& traced, const MethodOptions& options) {
+    if (!asset.gdm || traced.ofTop || options.table != nullptr) return nullptr;
+    const GdmMap& map = *asset.gdm;
+    const bool isThere = map.withVisibility || options.name != "gdm-visibility";
+    const int rank = map.factors ? map.factors->rank : 0;
+    const glm::ivec2 directions(map.table.directions.thetas, map.table.directions.phis);
+    const bool isAlike = map.table.nodes == traced.points && directions == traced.directions &&
+                         rank == (options.rank + 3) / 4 * 4 && map.bits == options.bits;
+    return isThere && (isAlike || (options.cells == 0 && options.layers == 0)) ? &map : nullptr;
+}
+
+Result<Method> displacementMethod(const Asset& asset, const Shape& shape, const MethodOptions& options) {
+    if (options.rank < 0 || options.rank > kMostRank)
+        return Error{.code = ErrorCode::Usage,
+                     .message = fmt::format("a rank of {}; it must be from 0 to {}", options.rank, kMostRank)};
+    Method method;
+    method.kind = WalkKind::Displacement;
+    const GdmOptions traced = tracedBy(shape, options);
+    if (const GdmMap* stored = storedMap(asset, traced, options)) {
+        method.gdm = std::make_unique<GdmMap>(*stored);
+        method.gdm->withVisibility = options.name == "gdm-visibility";
+        return method;
+    }
+    VCP_TRY_ASSIGN(auto properties, sampleProperties(shape, traced.points));
+    DistanceTable table;
+    if (options.table != nullptr) {
+        table = *options.table;
+    } else {
+        VCP_TRY_ASSIGN(table, traceTable(asset, shape, traced));
+    }
+    VCP_TRY(take(
+        packMap(std::move(table), options.rank, options.bits, options.name == "gdm-visibility", std::move(properties)),
+        method.gdm));
+    return method;
+}
+
 }  // namespace
 
 Skipping Method::skipping() const {
-    if (boxes) return {.boxes = boxes.get()};
+    if (boxes) return {.boxes = boxes.get(), .guesses = guesses.get(), .mostGuesses = mostGuesses};
     if (compressed) return {.compressed = compressed.get()};
     if (distances) return {.distances = distances.get()};
     return {.occupancy = occupancy.get()};
 }
 
 Result<MarchArrays> Method::arrays() const {
-    const bool isComplete = kind == WalkKind::Sphere ? sphere != nullptr
-                            : kind != WalkKind::Grid ? heights != nullptr
-                                                     : boxes || compressed || distances || occupancy;
+    const bool isComplete = kind == WalkKind::Sphere         ? sphere != nullptr
+                            : kind == WalkKind::Displacement ? gdm != nullptr
+                            : kind == WalkKind::Slices       ? volume != nullptr
+                            : kind != WalkKind::Grid         ? heights != nullptr
+                                                             : boxes || compressed || distances || occupancy;
     if (!isComplete) return Error{.code = ErrorCode::Usage, .message = "a mesostructure method without its arrays"};
     switch (kind) {
         case WalkKind::Relief:
@@ -85,6 +136,10 @@ Result<MarchArrays> Method::arrays() const {
             return pyramidArrays(*heights);
         case WalkKind::Sphere:
             return sphereArrays(*sphere);
+        case WalkKind::Displacement:
+            return gdmArrays(*gdm);
+        case WalkKind::Slices:
+            return slicesArrays(*volume);
         default:
             return gridArrays(skipping(), surface());
     }
@@ -98,6 +153,10 @@ Result<std::unique_ptr<Marcher>> Method::marcher() const {
             return pyramidMarcher(*heights);
         case WalkKind::Sphere:
             return sphereMarcher(*sphere);
+        case WalkKind::Displacement:
+            return gdmMarcher(*gdm);
+        case WalkKind::Slices:
+            return slicesMarcher(*volume);
         default:
             return gridMarcher(skipping(), surface());
     }
@@ -107,6 +166,11 @@ std::span<const std::string_view> methodNames() { return kNames; }
 
 bool methodFits(std::string_view name, const Asset& asset) {
     return asset.heights.has_value() || !(name.starts_with("relief") || name == "pyramid");
+}
+
+GdmOptions tracedBy(const Shape& shape, const MethodOptions& options) {
+    return {
+        .points = pointsOf(shape.extent(), options), .directions = options.directions, .ofTop = options.name == "vdm"};
 }
 
 Result<Method> buildMethod(const Asset& asset, const Shape& shape, const MethodOptions& options) {
@@ -129,8 +193,14 @@ Result<Method> buildMethod(const Asset& asset, const Shape& shape, const MethodO
                              .tolerance = options.tolerance};
         return method;
     }
+    if (name == "slices") {
+        method.kind = WalkKind::Slices;
+        VCP_TRY(take(sampleProperties(shape, pointsOf(shape.extent(), options)), method.volume));
+        return method;
+    }
+    if (name == "gdm" || name == "gdm-visibility" || name == "vdm") return displacementMethod(asset, shape, options);
     const glm::ivec3 cells = cellsOf(asset, shape.extent(), options.cells);
-    const bool isExact = name == "boxes" || name == "cells";
+    const bool withBoxes = name == "boxes" || name == "gdm-safe", isExact = withBoxes || name == "cells";
     if (isExact && asset.heights && (asset.heights->size.x % cells.x != 0 || asset.heights->size.y % cells.y != 0))
         return Error{.code = ErrorCode::Usage,
                      .message = fmt::format("a grid of {} x {} cells does not divide the height map's {} x {} texels",
@@ -142,10 +212,17 @@ Result<Method> buildMethod(const Asset& asset, const Shape& shape, const MethodO
     }
     VCP_TRY(addCells(method, asset, shape, cells, isExact));
     const bool isOwn = asset.occupancy && asset.occupancy->grid.cells == cells;
-    if (name == "boxes")
+    if (withBoxes)
         method.boxes =
             std::make_unique<OctantBoxes>(isOwn && asset.boxes ? *asset.boxes : buildOctantBoxes(*method.occupancy));
     if (method.boxes && method.field) markSmallCells(*method.field, *method.boxes);
+    if (name == "gdm-safe") {
+        method.mostGuesses = options.mostGuesses;
+        if (isOwn && asset.guesses)
+            method.guesses = std::make_unique<SafeFactors>(*asset.guesses);
+        else
+            VCP_TRY(take(buildGuesses(*method.occupancy, options.guesses), method.guesses));
+    }
     if (isExact) return method;
     const Cones cones = name == "dm" ? Cones{1, 1} : options.cones;
     const double cap = options.cap > 0 ? options.cap : cones.areSigns() ? 0.25 : 0.125;

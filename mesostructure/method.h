@@ -12,7 +12,7 @@
 
 namespace vcp::meso {
 
-enum class WalkKind { Grid, Relief, Pyramid, Sphere };
+enum class WalkKind { Grid, Relief, Pyramid, Sphere, Displacement, Slices };
 
 struct Method {
     WalkKind kind = WalkKind::Grid;
@@ -27,6 +27,10 @@ struct Method {
     std::unique_ptr<PatchSet> patches;
     std::unique_ptr<SampledField> field;
     std::unique_ptr<SphereMap> sphere;
+    std::unique_ptr<SafeFactors> guesses;  ///< beside boxes
+    int mostGuesses = 1;
+    std::unique_ptr<GdmMap> gdm;
+    std::unique_ptr<PropertyVolume> volume;
 
     [[nodiscard]] Skipping skipping() const;
     [[nodiscard]] Surface surface() const {
@@ -40,19 +44,30 @@ struct Method {
 
 struct MethodOptions {
     std::string name = "boxes";
-    int cells = 0;      ///< cells of the grid along x; 0: the asset's own grid, or 64
+    int cells = 0;      ///< cells of the grid, or points of a map, along x; 0: the asset's own grid, or 64; points 32
     Cones cones{4, 1};  ///< cones of ddm, ddm-quadric and ddm-quadric-fitted
     int steps = 32;     ///< steps of relief mapping
     int refinements = 10;
     float tolerance = ReliefOptions().tolerance;
+    int rank = 16;                         ///< terms of gdm, gdm-visibility and vdm; 0: the table itself
+    int bits = 16;                         ///< of their values: 8 or 16
+    glm::ivec2 directions{16, 32};         ///< theirs: elevations over the sphere (vdm: over its lower half), azimuths
+    int layers = 0;                        ///< points along z of a map or of slices; 0: as far apart as along x
+    const DistanceTable* table = nullptr;  ///< traced already by tracedBy of these options; null: it is traced
+    SafeOptions guesses = {};              ///< of gdm-safe
+    int mostGuesses = 1;                   ///< of a ray of gdm-safe
     double cap = 0;  ///< longest distance of dm, ddm, ddm-quadric and ddm-quadric-fitted, tiles; 0: 1/4, or 1/8
 };
 
 /// The names for height fields only: "relief-linear", "relief-binary", "relief-secant", "relief-secant-printed",
-/// "relief-illinois", "pyramid". For all: "sphere", "dm", "ddm", "ddm-quadric", "ddm-quadric-fitted", "boxes", "cells".
+/// "relief-illinois", "pyramid". For all: "sphere", "dm", "ddm", "ddm-quadric", "ddm-quadric-fitted", "boxes", "cells",
+/// "gdm", "gdm-visibility", "gdm-safe", "vdm", "slices".
 std::span<const std::string_view> methodNames();
 /// Whether a method of that name marches the asset: some march only height fields.
 bool methodFits(std::string_view name, const Asset& asset);
+
+/// Returns what is traced for "gdm", "gdm-visibility" and "vdm".
+GdmOptions tracedBy(const Shape& shape, const MethodOptions& options);
 
 /// Copies what the asset holds already, and builds the rest. `shape` is the asset's. Errors: Usage (no such method, or
 /// it does not fit this asset); the builders'.

@@ -11,13 +11,14 @@ INLINE void hitBottom(CONST_REF(Walk) w, bool outside, INOUT(MesoResult) result)
 
 INLINE int directionOf(vec3 d) {
     if (kSkip == kMesoOccupancy) return 0;
-    if (kSkip == kMesoBoxes) return octantOf(d);
+    if (kSkip == kMesoBoxes || kSkip == kMesoGuess) return octantOf(d);
     return coneAlong(d);
 }
 
 INLINE void marchGrid(MesoRay ray, INOUT(MesoResult) result) {
     Walk w = startWalk(ray, meso.cells, meso.extent);
-    int direction = directionOf(w.d * meso.cell);
+    vec3 heading = w.d * meso.cell;
+    int direction = directionOf(heading), guesses = kSkip == kMesoGuess ? meso.guesses : 0;
     Side side;
     side.outside = w.startsAtTop || ray.isOutside;
     side.inRun = !ray.isOutside;
@@ -39,6 +40,10 @@ INLINE void marchGrid(MesoRay ray, INOUT(MesoResult) result) {
             marks = space.marks;
             if (found) break;
             side.inRun = false;
+            if (guesses > 0) {
+                guesses--;
+                space.reach = guessAt(coneAlong(heading), w.cell, result.fetches);
+            }
             if (space.reach > 0.0f && w.t + space.reach > exit)
                 walkJump(w, w.t + space.reach);
             else if (exit >= kFar)
@@ -256,6 +261,11 @@ INLINE void marchSphere(MesoRay ray, INOUT(MesoResult) result) {
 
 // Whether a point is in the solid, for the methods that have samples and look only at cells with surface.
 INLINE bool isSolidAt(vec3 p) {
+    if (kWalk >= kMesoGdm) {
+        MesoResult unused;
+        unused.fetches = 0u;
+        return propertyAt(p, unused).w >= 0.5f;
+    }
     if (kSurface != kMesoHeights && kSurface != kMesoField) return false;
     vec3 at = p / meso.extent * vec3(meso.fine), w = fract(at);
     if (kSurface == kMesoHeights)
@@ -280,6 +290,12 @@ INLINE MesoResult marchMeso(MesoRay ray) {
         marchPyramid(ray, result);
     else if (kWalk == kMesoSphere)
         marchSphere(ray, result);
+    else if (kWalk == kMesoGdm)
+        marchGdm(ray, result);
+    else if (kWalk == kMesoVdm)
+        marchVdm(ray, result);
+    else if (kWalk == kMesoSlices)
+        marchSlices(ray, result);
     else
         marchGrid(ray, result);
     return result;

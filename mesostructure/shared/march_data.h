@@ -58,7 +58,7 @@ INLINE Space spaceAt(int direction, ivec3 cell, INOUT(uint) fetches) {
     if (kSkip == kMesoCompressed) return lookUp(uint(direction), cell, fetches);
     fetches++;
     uint slot = uint(direction) * uint(meso.cellCount) + cellIndex(cell, meso.cells);
-    if (kSkip == kMesoBoxes) {
+    if (kSkip == kMesoBoxes || kSkip == kMesoGuess) {
         uint box = fetchShort(meso.skipping, slot);
         if ((box & kMesoBoxOccupied) != 0u) return occupiedSpace(box & (kMesoBoxOccupied - 1u));
         return emptySpace(ivec3(int(box & 31u), int((box >> 5) & 31u), int((box >> 10) & 31u)), 0.0f);
@@ -70,6 +70,34 @@ INLINE Space spaceAt(int direction, ivec3 cell, INOUT(uint) fetches) {
     }
     if (steps == kMesoOccupied) return occupiedSpace(0u);
     return emptySpace(ivec3(0), float(steps) * meso.unit);
+}
+
+INLINE float halfAt(uvec4 quad, int place) {
+    uint word = place < 4 ? (place < 2 ? quad.x : quad.y) : (place < 6 ? quad.z : quad.w);
+    return signedShort(word >> (uint(place & 1) * 16u));
+}
+
+// Returns a length that a ray may go from a cell in a cone, or less, or none: a sum of few factors less its bound
+// (meso::SafeFactors).
+INLINE float guessAt(int cone, ivec3 cell, INOUT(uint) fetches) {
+    uint plane = uint(meso.cells.x * meso.cells.y);
+    uint row = uint(cone % meso.azimuths) * plane + cellIndex(ivec3(cell.x, cell.y, 0), meso.cells);
+    uint column = uint(cone / meso.azimuths * meso.cells.z + cell.z);
+    uint rows = plane * uint(meso.azimuths), columns = uint(meso.columnCount * meso.clusters);
+    float sum = 0.0f, bound = 0.0f;
+    for (int group = 0; group < meso.levelCount; ++group) {
+        fetches += 2u;
+        uvec4 weights = fetchQuad(meso.guessRows + uint(group) * rows + row);
+        if (group == 0) column += (weights.w >> 16) * uint(meso.columnCount);
+        uvec4 values = fetchQuad(meso.guessColumns + uint(group) * columns + column);
+        if (group == 0) {
+            sum = halfAt(values, 7) * meso.unit;
+            bound = float(min(weights.w & 0xffffu, values.w & 0xffffu)) * meso.unit;
+        }
+        for (int place = 0; place < (group == 0 ? 6 : 8); ++place)
+            sum += halfAt(weights, place) * halfAt(values, place) * meso.product;
+    }
+    return min(sum - bound, 16.0f);
 }
 
 INLINE Patch fetchPatch(uint i) {

@@ -6,9 +6,12 @@ const uint kMesoMaxLevels = 14u;
 const uint kMesoMostBorders = 32u;
 
 // The values of the constants that choose a marcher.
-const uint kMesoGrid = 0u, kMesoRelief = 1u, kMesoPyramid = 2u, kMesoSphere = 3u;            // kWalk
-const uint kMesoOccupancy = 0u, kMesoDistances = 1u, kMesoCompressed = 2u, kMesoBoxes = 3u;  // kSkip
-const uint kMesoCell = 0u, kMesoPatches = 1u, kMesoHeights = 2u, kMesoField = 3u;            // kSurface
+const uint kMesoGrid = 0u, kMesoRelief = 1u, kMesoPyramid = 2u, kMesoSphere = 3u, kMesoGdm = 4u, kMesoVdm = 5u,
+           kMesoSlices = 6u;                                                                                  // kWalk
+const uint kMesoOccupancy = 0u, kMesoDistances = 1u, kMesoCompressed = 2u, kMesoBoxes = 3u, kMesoGuess = 4u;  // kSkip
+const uint kMesoTable = 0u, kMesoFactored = 1u;                                    // kSkip of a displacement map
+const uint kMesoDensity = 0u, kMesoVisibilityBit = 1u;                             // kSurface of a displacement map
+const uint kMesoCell = 0u, kMesoPatches = 1u, kMesoHeights = 2u, kMesoField = 3u;  // kSurface
 const uint kMesoUnrefined = 0u, kMesoBinary = 1u, kMesoSecant = 2u, kMesoAsPrinted = 3u,
            kMesoIllinois = 4u;  // kRefinement
 
@@ -41,21 +44,27 @@ struct MesoRecord {
     float reach;  // (sphere) the distance that is a hit, tile units
     ivec3 cells;  // of the grid
     int cellCount;
-    ivec3 fine;           // texels or samples along the axes
-    int mostSteps;        // (sphere, relief)
-    ivec3 ratio;          // texels or samples a cell
-    int mostRefinements;  // (relief)
-    int azimuths, elevations, levelCount, unused0;
-    ivec3 top;  // (compressed) entries of level 0
-    int unused1;
-    uint skipping;    // word of what skips
-    uint data;        // word of texels, samples or ranks
-    uint rows;        // word of the rows
-    uint patches;     // first quad of the patches
-    float step;       // tile units of a step of a height or (sphere) of a distance
+    ivec3 fine;                            // texels, samples or a displacement map's points along the axes
+    int mostSteps;                         // (sphere, relief)
+    ivec3 ratio;                           // texels or samples a cell
+    int mostRefinements;                   // (relief)
+    int azimuths, elevations, levelCount;  // (displacement maps, guesses) the last is groups of terms
+    int columnCount;                       // (displacement maps, guesses) of the matrix; its rows are cellCount
+    ivec3 top;                             // (compressed) entries of level 0
+    int clusters;                          // (guesses)
+    ivec3 volume;                          // (displacement maps, slices) points of the solid's density and normals
+    int valueBits;                         // (displacement maps) 8 or 16
+    uint guessRows, guessColumns;          // first quads
+    int guesses;                           // that a ray makes at most
+    float product;                         // (guesses) tile units of a weight times a value
+    uint skipping;                         // word of what skips
+    uint data;                             // word of texels, samples or ranks
+    uint rows;                             // word of the rows
+    uint patches;                          // first quad of the patches
+    float step;       // tile units of a step of a height or (sphere, displacement maps) of a distance
     float height;     // of the slab, tile units
     float tolerance;  // (relief)
-    float unused2;
+    float unused0;
     MesoLevel levels[kMesoMaxLevels];
     MesoBorder borders[kMesoMostBorders];
 };

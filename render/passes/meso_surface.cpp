@@ -44,7 +44,8 @@ double shadowLift(const meso::MarchArrays& arrays, double tileEdge) {
         c.walk == meso::f32::kMesoPyramid || c.surface == meso::f32::kMesoHeights || c.surface == meso::f32::kMesoField;
     if (r.fine.x > 0 && (isExact || c.walk == meso::f32::kMesoRelief))
         return (isExact ? 0.25 : 1.5) * tileEdge / r.fine.x;
-    return 0.5 * tileEdge * double(r.cell.x);
+    // A displacement map is 0 within the solid, and filtered with what lies around.
+    return (c.walk >= meso::f32::kMesoGdm ? 1.5 : 0.5) * tileEdge * double(r.cell.x);
 }
 
 Result<void> MesoSurfacePass::setSurfaces(std::span<const MesoSurface> surfaces) {

@@ -5,4 +5,5 @@
 #include "mesostructure/shared/patch_solve.h"
 #include "mesostructure/shared/march_data.h"
 #include "mesostructure/shared/march_cells.h"
+#include "mesostructure/shared/march_gdm.h"
 #include "mesostructure/shared/march.h"

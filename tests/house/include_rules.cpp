@@ -31,6 +31,7 @@ const std::vector<Outside>& outsideRules() {
          {"viewer/window", "viewer/examples"},
          "GLFW and ImGui belong to viewer/window/"},
         {std::regex("OpenMesh/.*"), {"mesostructure/base"}, "OpenMesh belongs to mesostructure/base/"},
+        {std::regex("Eigen/.*"), {"mesostructure/gdm"}, "Eigen belongs to mesostructure/gdm/"},
         {std::regex("CLI/.*"), {"viewer/command"}, "CLI11 belongs to viewer/command/"},
         {std::regex("thread|mutex|shared_mutex|condition_variable|future|stop_token|semaphore|latch|barrier|execution|"
                     "pthread\\.h|tbb/.*|oneapi/.*"),

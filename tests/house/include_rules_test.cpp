@@ -192,6 +192,8 @@ TEST(IncludeRules, SamplesAreJudged) {
         {"viewer/scene", "#include <CLI/CLI.hpp>\n#include \"viewer/command/commands.h\"\n", 2},
         {"viewer/scene", "#include \"mesostructure/base/subdivision.h\"\n#include <OpenMesh/Core/IO/MeshIO.hh>\n", 1},
         {"mesostructure/base", "#include <OpenMesh/Core/Mesh/TriMesh_ArrayKernelT.hh>\n", 0},
+        {"mesostructure/gdm", "#include <Eigen/Dense>\n#include \"mesostructure/shape.h\"\n", 1},
+        {"mesostructure", "#include <Eigen/Dense>\n#include \"mesostructure/gdm/factors.h\"\n", 1},
         {"viewer/scene", "    std::fprintf(stderr, \"done\");\n", 1},
         {"viewer/command", "#include <CLI/CLI.hpp>\n    std::fprintf(stderr, \"done\");  // stderr\n", 0},
         {"viewer/window", "#include <GLFW/glfw3.h>\n#include \"viewer/viewer.h\"\n// on stdout\n", 0},

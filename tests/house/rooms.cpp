@@ -27,7 +27,8 @@ const std::vector<Room>& rooms() {
           "builder/page", "builder/slab", "builder/level"}},
         {"builder/paper", {"octree/", "builder", "builder/mesh", "builder/measure"}},
 
-        {"mesostructure", {"octree/"}},
+        {"mesostructure/gdm", {"octree/"}},
+        {"mesostructure", {"octree/", "mesostructure/gdm"}},
         {"mesostructure/base", {"octree/", "mesostructure"}},
         {"mesostructure/remesh", {"octree/", "mesostructure", "mesostructure/base"}},
         {"streaming", {"octree/"}},

@@ -8,6 +8,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "mesostructure/method.h"
 #include "octree/io/content_hash.h"
 #include "tests/support/meso_rays.h"
 #include "tests/support/test_folder.h"
@@ -74,6 +75,51 @@ TEST(AssetFile, GivesBackWhatWasWritten) {
     }
 }
 
+Asset withMap(int rank, bool withVisibility) {
+    Asset asset;
+    asset.name = asset.solid = "ball";
+    AssetOptions options{.cells = {8, 8, 2}, .samples = 1, .distances = {.cones = {2, 1}}, .factors = {}};
+    options.withBoxes = options.withPatches = false;
+    options.withGuesses = true;
+    options.guesses = {.clusters = 3, .rounds = 1};
+    options.gdm = {.traced = {.points = {5, 4, 3}, .directions = {4, 6}},
+                   .rank = rank,
+                   .bits = rank == 8 ? 8 : 16,
+                   .withVisibility = withVisibility};
+    const auto built = buildAsset(asset, options);
+    EXPECT_TRUE(built.ok()) << built.error().line();
+    return asset;
+}
+
+TEST(AssetFile, DisplacementMapsAndGuessesComeBack) {
+    const TestFolder folder("meso_asset_gdm_test");
+    for (const auto& [rank, withVisibility] : {std::pair{0, true}, {4, false}, {8, true}}) {
+        const Asset asset = withMap(rank, withVisibility);
+        ASSERT_TRUE(writeAsset(folder / "a.meso", asset).ok());
+        const auto read = readAsset(folder / "a.meso");
+        ASSERT_TRUE(read.ok()) << read.error().line();
+        EXPECT_EQ(read->gdm->bytes(), asset.gdm->bytes());
+        EXPECT_EQ(read->gdm->table.steps, asset.gdm->table.steps);
+        EXPECT_EQ(read->gdm->table.hits, asset.gdm->table.hits);
+        EXPECT_EQ(read->gdm->properties.texels, asset.gdm->properties.texels);
+        EXPECT_EQ(read->guesses->rows, asset.guesses->rows);
+        EXPECT_EQ(read->guesses->columns, asset.guesses->columns);
+        if (rank > 0) {
+            EXPECT_EQ(read->gdm->factors->weights, asset.gdm->factors->weights);
+        }
+        // A method without a size of its own takes what is stored.
+        const auto shape = *shapeOf(*read);
+        const auto method = buildMethod(*read, *shape, {.name = "gdm"});
+        ASSERT_TRUE(method) << method.error().line();
+        EXPECT_EQ(method->gdm->table.nodes, glm::ivec3(5, 4, 3));
+        const auto safe = buildMethod(*read, *shape, {.name = "gdm-safe"});
+        ASSERT_TRUE(safe) << safe.error().line();
+        EXPECT_EQ(safe->guesses->rows, asset.guesses->rows);
+        ASSERT_TRUE(writeAsset(folder / "b.meso", *read).ok());
+        EXPECT_EQ(contentOf(folder / "a.meso"), contentOf(folder / "b.meso"));
+    }
+}
+
 TEST(AssetFile, EveryTruncationAndEveryFlippedBitIsRefused) {
     const TestFolder folder("meso_asset_damage_test");
     Asset asset = small("ball");
@@ -133,6 +179,37 @@ TEST(AssetFile, LiesBehindValidHashesAreRefusedOrHarmless) {
         for (int k = 0; k < 5; ++k) static_cast<void>((*marcher)->march(test::rayFromTop(random, read->extent)));
     }
     EXPECT_GT(refused, 300);
+}
+
+TEST(AssetFile, LiesOfMapsAreRefusedOrHarmless) {
+    const TestFolder folder("meso_asset_map_lies_test");
+    for (const int rank : {0, 4, 8}) {
+        ASSERT_TRUE(writeAsset(folder / "a.meso", withMap(rank, true)).ok());
+        const Bytes bytes = bytesOf(folder / "a.meso");
+        std::mt19937 random(7);
+        int refused = 0;
+        for (int i = 0; i < 1500; ++i) {
+            Bytes changed = bytes;
+            const size_t first = 256 + 48 * 6, at = first + random() % (changed.size() - first - 64);
+            const uint32_t value = i % 3 == 0 ? 0xffffffffu : i % 3 == 1 ? uint32_t(random()) : uint32_t(random() % 40);
+            std::memcpy(changed.data() + at, &value, std::min<size_t>(4, changed.size() - 64 - at));
+            resign(changed);
+            const auto read = parseAsset(changed, "lie");
+            refused += !read.ok();
+            if (!read) continue;
+            const auto marcher = gdmMarcher(*read->gdm);
+            ASSERT_TRUE(marcher.ok());
+            const OctantBoxes boxes = buildOctantBoxes(*read->occupancy);
+            const auto safe =
+                gridMarcher({.boxes = &boxes, .guesses = &*read->guesses, .mostGuesses = 3}, {.field = &*read->field});
+            ASSERT_TRUE(safe.ok());
+            for (int k = 0; k < 5; ++k) {
+                const MarchRay ray = test::rayFromTop(random, read->extent);
+                static_cast<void>((*marcher)->march(ray)), static_cast<void>((*safe)->march(ray));
+            }
+        }
+        EXPECT_GT(refused, 20) << rank;
+    }
 }
 
 TEST(AssetFile, OtherFilesAreToldApart) {

@@ -109,12 +109,15 @@ TEST(FrameLayout, Mesostructure) {
                                                AT(MesoRecord, fine),       AT(MesoRecord, mostSteps),
                                                AT(MesoRecord, ratio),      AT(MesoRecord, mostRefinements),
                                                AT(MesoRecord, azimuths),   AT(MesoRecord, elevations),
-                                               AT(MesoRecord, levelCount), AT(MesoRecord, unused0),
-                                               AT(MesoRecord, top),        AT(MesoRecord, unused1),
+                                               AT(MesoRecord, levelCount), AT(MesoRecord, columnCount),
+                                               AT(MesoRecord, top),        AT(MesoRecord, clusters),
+                                               AT(MesoRecord, volume),     AT(MesoRecord, valueBits),
+                                               AT(MesoRecord, guessRows),  AT(MesoRecord, guessColumns),
+                                               AT(MesoRecord, guesses),    AT(MesoRecord, product),
                                                AT(MesoRecord, skipping),   AT(MesoRecord, data),
                                                AT(MesoRecord, rows),       AT(MesoRecord, patches),
                                                AT(MesoRecord, step),       AT(MesoRecord, height),
-                                               AT(MesoRecord, tolerance),  AT(MesoRecord, unused2),
+                                               AT(MesoRecord, tolerance),  AT(MesoRecord, unused0),
                                                AT(MesoRecord, levels),     AT(MesoRecord, borders)}));
     EXPECT_EQ(offsets.at("MesoLevel"), (Words{AT(MesoLevel, first), AT(MesoLevel, entries),
                                               AT(MesoLevel, edgeAndFactor), AT(MesoLevel, bricks)}));

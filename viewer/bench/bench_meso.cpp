@@ -45,6 +45,13 @@ struct Subject {
     Asset asset;
     std::unique_ptr<Shape> shape;
     double texel = 0;  ///< tile units
+
+    struct Traced {
+        GdmOptions options;
+        double seconds = 0;
+        DistanceTable table;
+    };
+    std::vector<std::unique_ptr<Traced>> traced;  ///< tables, which methods share
 };
 
 Result<std::unique_ptr<Subject>> subjectOf(const std::string& name) {
@@ -108,6 +115,44 @@ struct Entry {
     MethodOptions options;
 };
 
+/// Adds displacement maps, slices, and guesses. Tables of one size are traced once.
+void addDisplacementMaps(std::vector<Entry>& all) {
+    for (const char* name : {"gdm", "gdm-visibility", "vdm"}) {
+        const bool isOfTop = name == std::string_view("vdm");
+        for (const int rank : {4, 8, 16, 32})
+            all.push_back(
+                {fmt::format("rank {} grid 32", rank), rank == 16, {.name = name, .cells = 32, .rank = rank}});
+        all.push_back({"rank 16 8 bits grid 32", false, {.name = name, .cells = 32, .rank = 16, .bits = 8}});
+        for (const int bits : {8, 16})
+            all.push_back({fmt::format("table {} bits grid 32", bits),
+                           false,
+                           {.name = name, .cells = 32, .rank = 0, .bits = bits}});
+        all.push_back(
+            {"rank 16 grid 32 directions 8x16", false, {.name = name, .cells = 32, .rank = 16, .directions = {8, 16}}});
+        all.push_back({"rank 16 grid 16", false, {.name = name, .cells = 16, .rank = 16}});
+        if (!isOfTop) continue;
+        for (const int cells : {64, 128, 256}) {
+            all.push_back({fmt::format("rank 16 grid {}", cells), false, {.name = name, .cells = cells, .rank = 16}});
+            all.push_back(
+                {fmt::format("table 16 bits grid {}", cells), false, {.name = name, .cells = cells, .rank = 0}});
+        }
+    }
+    for (const int layers : {16, 32})
+        all.push_back({fmt::format("rank 16 grid 32 layers {}", layers),
+                       false,
+                       {.name = "gdm", .cells = 32, .rank = 16, .layers = layers}});
+    for (const int cells : {32, 64, 128, 256})
+        all.push_back({fmt::format("grid {}", cells), cells == 64, {.name = "slices", .cells = cells}});
+    for (const int layers : {16, 32})
+        all.push_back(
+            {fmt::format("grid 64 layers {}", layers), false, {.name = "slices", .cells = 64, .layers = layers}});
+    for (const int cells : {16, 32, 64})
+        for (const int guesses : {1, 2})
+            all.push_back({fmt::format("grid {} guesses {}", cells, guesses),
+                           cells == 32 && guesses == 1,
+                           {.name = "gdm-safe", .cells = cells, .mostGuesses = guesses}});
+}
+
 std::vector<Entry> entries() {
     std::vector<Entry> all;
     constexpr std::array kSteps = {5, 10, 32, 64, 256};
@@ -148,6 +193,7 @@ std::vector<Entry> entries() {
     for (const int cells : {16, 32, 64, 128})
         all.push_back({fmt::format("grid {}", cells), cells == 64, {.name = "boxes", .cells = cells}});
     all.push_back({"grid 64", true, {.name = "cells", .cells = 64}});
+    addDisplacementMaps(all);
     return all;
 }
 
@@ -197,14 +243,50 @@ BenchMesoRow rowOf(const Subject& subject, const Measured& method, const RayView
     return row;
 }
 
-Result<Measured> measuredOf(const Subject& subject, const Entry& entry) {
+Result<const Subject::Traced*> tracedOf(Subject& subject, const GdmOptions& options) {
+    for (const auto& t : subject.traced)
+        if (t->options.points == options.points && t->options.directions == options.directions &&
+            t->options.ofTop == options.ofTop)
+            return t.get();
+    auto made = std::make_unique<Subject::Traced>();
+    made->options = options;
+    const auto start = Clock::now();
+    VCP_TRY_ASSIGN(made->table, traceTable(subject.asset, *subject.shape, options));
+    made->seconds = secondsSince(start);
+    subject.traced.push_back(std::move(made));
+    return subject.traced.back().get();
+}
+
+Result<Measured> measuredOf(Subject& subject, const Entry& entry) {
     Measured method;
     method.name = entry.options.name, method.knob = entry.knob;
+    MethodOptions options = entry.options;
+    double traceSeconds = 0;
+    if (options.name == "gdm" || options.name == "gdm-visibility" || options.name == "vdm") {
+        VCP_TRY_ASSIGN(const auto* traced, tracedOf(subject, tracedBy(*subject.shape, options)));
+        options.table = &traced->table;
+        traceSeconds = traced->seconds;
+    }
     const auto start = Clock::now();
-    VCP_TRY_ASSIGN(method.method, buildMethod(subject.asset, *subject.shape, entry.options));
-    method.preprocessSeconds = secondsSince(start);
+    VCP_TRY_ASSIGN(method.method, buildMethod(subject.asset, *subject.shape, options));
+    method.preprocessSeconds = traceSeconds + secondsSince(start);
     VCP_TRY_ASSIGN(method.marcher, method.method.marcher());
     return method;
+}
+
+/// Compares with the data sizes of Wang et al. 2004, Fig. 7: 8 bits an entry over factors of 16, 16 and 8 bytes a row.
+void compareFactors(std::vector<MesoPublished>& published) {
+    struct Row {
+        glm::ivec3 points;
+        int bytes;
+        double ratio;
+    };
+    for (const Row& row : {Row{{64, 64, 32}, 16, 32}, Row{{32, 32, 16}, 16, 16}, Row{{128, 128, 16}, 8, 32}}) {
+        const double rows = 32.0 * row.points.x * row.points.y, columns = 16.0 * row.points.z;
+        published.push_back({fmt::format("Wang Fig. 7: bytes of a table over its factors, {} x {} x {}", row.points.x,
+                                         row.points.y, row.points.z),
+                             "any", "bytes", row.ratio, row.ratio, rows * columns / ((rows + columns) * row.bytes), 0});
+    }
 }
 
 /// Compares with Table 3: texels of the plain map over those of lookup and atlas, at the paper's resolution.
@@ -238,7 +320,7 @@ bool isAsked(const std::vector<std::string>& asked, std::string_view name) {
 }
 
 /// Measures all requested methods over all views; the rows of a method stand together.
-Result<std::vector<BenchMesoRow>> rowsOf(const Subject& subject, const BenchMesoOptions& options, MesoMarcher* renderer,
+Result<std::vector<BenchMesoRow>> rowsOf(Subject& subject, const BenchMesoOptions& options, MesoMarcher* renderer,
                                          const std::function<bool(const std::string&)>& told) {
     const auto isMeasured = [&](const Entry& e) {
         return isAsked(options.methods, e.options.name) && (options.sweep || e.isDefault) &&
@@ -313,6 +395,11 @@ Result<BenchMesoReport> benchMeso(const BenchMesoOptions& options) {
         VCP_TRY_ASSIGN(const auto subject, subjectOf(assets[a]));
         VCP_TRY_ASSIGN(auto rows, rowsOf(*subject, options, renderer.get(), told));
         report.rows.insert(report.rows.end(), rows.begin(), rows.end());
+        if (options.factors) {
+            if (!told("factors")) return Error::cancelled();
+            VCP_TRY_ASSIGN(const auto factors, compareMesoFactors(subject->asset, *subject->shape));
+            report.factors.insert(report.factors.end(), factors.begin(), factors.end());
+        }
         if (options.checkRays == 0) continue;
         if (!told("conservative maps")) return Error::cancelled();
         VCP_TRY_ASSIGN(const auto checks,
@@ -324,6 +411,7 @@ Result<BenchMesoReport> benchMeso(const BenchMesoOptions& options) {
     if (options.published) {
         report.published = publishedOf(report.rows);
         VCP_TRY(compareCompression(report.published));
+        compareFactors(report.published);
     }
     return report;
 }

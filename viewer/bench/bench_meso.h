@@ -32,6 +32,7 @@ struct BenchMesoOptions {
     int rays = 2000;                    ///< a view
     int repetitions = 3;                ///< rounds over the methods
     bool published = false;             ///< compares with the paper's tables; its Table 3 is made anew
+    bool factors = false;               ///< compares the factors of displacement maps
     uint64_t checkRays = 0;             ///< rays of the conservative test for each asset; 0: not made
     /// Called with what is being done; false cancels. May be empty.
     std::function<bool(const std::string&, double fraction)> progress;
@@ -78,7 +79,7 @@ struct MesoCheck {
     double worstTexels = 0;
 };
 
-/// A ratio that a paper prints (Mehra and Kumar, Tables 1 to 3; Risser et al., refinements of binary over secant
+/// A ratio that a paper prints (Mehra and Kumar, Tables 1 to 3; Wang et al.; Risser et al., binary over secant
 /// search), over its models from least to most, and ours: the mean over the views of an asset. Figure 7 has no numbers;
 /// the rows' iterationBins are its bins.
 struct MesoPublished {
@@ -101,10 +102,21 @@ struct MesoHeadline {
     double ratioToPeer = 0;  ///< mean over the views
 };
 
+/// Says how well factors stand for a displacement map's distances, over all its entries.
+struct MesoFactors {
+    std::string asset, form;
+    int rank = 0, clusters = 1;
+    uint64_t bytes = 0;
+    double rmsPoints = 0;   ///< root of the mean squared error, in points' distances
+    double offByPoint = 0;  ///< part of the entries that are off by more than one
+    double wrongHits = 0;   ///< part whose hit, told by half a point before the boundary, is wrong
+};
+
 struct BenchMesoReport {
     std::vector<BenchMesoRow> rows;
     std::vector<MesoCheck> checks;
     std::vector<MesoPublished> published;
+    std::vector<MesoFactors> factors;
 };
 
 /// Names the method, at its default knob, that times are divided by: relief mapping, binary, 32 steps, for height
@@ -120,6 +132,9 @@ Result<BenchMesoReport> benchMeso(const BenchMesoOptions& options);
 /// cells that are not occupied, each against the shape. Errors: the builders'.
 Result<std::vector<MesoCheck>> checkMesoMaps(const std::string& asset, const meso::Shape& shape, double texel,
                                              uint64_t rays);
+
+/// Compares factors of an asset's displacement map of 32 points along x. Errors: the builders'.
+Result<std::vector<MesoFactors>> compareMesoFactors(const meso::Asset& asset, const meso::Shape& shape);
 
 /// Judges the rays whose truth is known; `texel` in tile units.
 MesoJudged judgeMeso(const std::vector<meso::MarchResult>& results, const std::vector<meso::TruthHit>& truths,

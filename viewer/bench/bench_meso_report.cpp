@@ -113,7 +113,16 @@ std::vector<MesoPublished> publishedOf(const std::vector<BenchMesoRow>& rows) {
         {"Table 2: DDM with quadrics 16 over distance map 128", "ddm-quadric-fitted", "4x1 grid 16", "dm", "grid 128",
          0.89, 2.4},
         {"Risser: binary over secant, 5 steps", "relief-binary", "steps 5", "relief-secant", "steps 5", 5.0 / 3,
-         8.0 / 2, true}};
+         8.0 / 2, true},
+        {"Wang: rate of GDM over VDM", "vdm", "rank 16 grid 32", "gdm", "rank 16 grid 32", 0.630, 0.686},
+        {"Wang: rate of GDM over slices, 64 x 64 x 16", "slices", "grid 64 layers 16", "gdm",
+         "rank 16 grid 32 layers 16", 1.88, 1.88},
+        {"Wang: rate of GDM over slices, 64 x 64 x 32", "slices", "grid 64 layers 32", "gdm",
+         "rank 16 grid 32 layers 32", 3.8, 3.8},
+        {"Wang: rate of GDM, 32 layers over 16", "gdm", "rank 16 grid 32 layers 16", "gdm", "rank 16 grid 32 layers 32",
+         0.95, 0.95},
+        {"Wang: rate of slices, 32 layers over 16", "slices", "grid 64 layers 16", "slices", "grid 64 layers 32", 0.47,
+         0.47}};
     std::vector<std::string> assets;
     for (const BenchMesoRow& row : rows)
         if (std::ranges::find(assets, row.asset) == assets.end()) assets.push_back(row.asset);
@@ -188,7 +197,22 @@ std::string benchMesoJson(const BenchMesoReport& report) {
                              {"fetches_knob", h.fetchesKnob},
                              {"ratio_to_peer", h.ratioToPeer},
                              {"ratio_knob", h.timeKnob}});
-    return Json{{"rows", rowsOf(report)}, {"headline", headlines}, {"checks", checks}, {"published", published}}.dump();
+    Json factors = Json::array();
+    for (const MesoFactors& f : report.factors)
+        factors.push_back({{"asset", f.asset},
+                           {"form", f.form},
+                           {"rank", f.rank},
+                           {"clusters", f.clusters},
+                           {"bytes", f.bytes},
+                           {"rms_points", f.rmsPoints},
+                           {"off_by_a_point", f.offByPoint},
+                           {"wrong_hits", f.wrongHits}});
+    return Json{{"rows", rowsOf(report)},
+                {"headline", headlines},
+                {"checks", checks},
+                {"published", published},
+                {"factors", factors}}
+        .dump();
 }
 
 std::string benchMesoCsv(const BenchMesoReport& report) { return csvOf(rowsOf(report)); }
@@ -227,6 +251,14 @@ std::string benchMesoMarkdown(const BenchMesoReport& report) {
             text += fmt::format("| {} | {} | {:.3g} to {:.3g} | {} | {:.3g} | {} | {} |\n", row.what, row.asset,
                                 row.least, row.most, row.of, row.ours, row.isNear() ? "yes" : "no",
                                 row.oursTime > 0 ? fmt::format("{:.3g}", row.oursTime) : std::string());
+    }
+    if (!report.factors.empty()) {
+        text +=
+            "\n| asset | form | rank | clusters | MB | rms, points | off by a point % | wrong hits % "
+            "|\n|---|---|---|---|---|---|---|---|\n";
+        for (const MesoFactors& f : report.factors)
+            text += fmt::format("| {} | {} | {} | {} | {:.3f} | {:.3f} | {:.1f} | {:.1f} |\n", f.asset, f.form, f.rank,
+                                f.clusters, double(f.bytes) * 1e-6, f.rmsPoints, 100 * f.offByPoint, 100 * f.wrongHits);
     }
     if (report.checks.empty()) return text;
     text += "\n| asset | map | rays | oversteps | worst, texels |\n|---|---|---|---|---|\n";

@@ -409,6 +409,8 @@ RunCommand addBenchMeso(CLI::App& bench) {
         ->delimiter(',')
         ->allow_extra_args(false);
     app->add_flag("--sweep", options.sweep, "Each method at several values of its knob");
+    app->add_flag("--factors", options.factors,
+                  "Also compare factors of displacement maps, published and clustered, with the distances");
     app->add_flag("--published", options.published,
                   "Beside the ratios of the paper's tables (with --sweep, for those of times)");
     app->add_option("--device", command->device,

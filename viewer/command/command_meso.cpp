@@ -9,9 +9,13 @@
 #include "mesostructure/asset_file.h"
 #include "mesostructure/solids.h"
 #include "viewer/asset/height_image.h"
+#include "viewer/asset/share_out.h"
 #include "viewer/asset/tile_mesh.h"
 #include "viewer/command/command_meso_base.h"
 #include "viewer/command/commands.h"
+#include "viewer/command/parsed_option.h"
+#include "viewer/command/terminal/interrupt.h"
+#include "viewer/command/terminal/progress_display.h"
 #include "viewer/scene/option_values.h"
 
 namespace vcp {
@@ -27,7 +31,10 @@ struct BuildMeso {
     int texels = 256, samples = 2;
     uint32_t seed = 1;
     double cap = 0.25;
-    bool noBoxes = false, noPatches = false, overwrite = false;
+    bool noBoxes = false, noPatches = false, overwrite = false, guesses = false, noVisibility = false;
+    std::string gdm, directions = "16x32";
+    int rank = 16, bits = 16;
+    uint64_t memoryBytes = uint64_t{1} << 30;
     ReportOptions report;
 };
 
@@ -68,7 +75,24 @@ Result<AssetOptions> optionsOf(const BuildMeso& c) {
     options.crossings = c.crossings == "fitted" ? CrossingRule::Fitted : CrossingRule::Direct;
     options.samples = c.samples;
     options.withBoxes = !c.noBoxes, options.withPatches = !c.noPatches;
+    options.withGuesses = c.guesses;
     return options;
+}
+
+/// Reads what the displacement map is to be, where there is to be one; `extent` is the tile's.
+Result<std::optional<AssetOptions::Displacement>> displacementOf(const BuildMeso& c, glm::dvec3 extent) {
+    if (c.gdm.empty()) return std::optional<AssetOptions::Displacement>();
+    AssetOptions::Displacement map{.traced = {}, .rank = c.rank, .bits = c.bits, .withVisibility = !c.noVisibility};
+    const std::vector<int> points = wholeNumbers(c.gdm, 'x'), directions = wholeNumbers(c.directions, 'x');
+    if (points.size() != 1 && points.size() != 3)
+        return wrong("--gdm must be like 32 or 64x64x32, not \"" + c.gdm + "\"");
+    if (directions.size() != 2) return wrong("--directions must be like 16x32, not \"" + c.directions + "\"");
+    map.traced.points = points.size() == 3 ? glm::ivec3(points[0], points[1], points[2])
+                                           : glm::ivec3(points[0], std::lround(points[0] * extent.y),
+                                                        std::lround(points[0] * extent.z) + 1);
+    map.traced.directions = {directions[0], directions[1]};
+    map.traced.memoryBytes = c.memoryBytes;
+    return std::optional(map);
 }
 
 Result<glm::ivec3> cellsOf(const std::string& text, glm::dvec3 extent) {
@@ -132,6 +156,10 @@ Json toJson(const std::string& file, uint64_t fileBytes, const Asset& a) {
     json["patches"] = a.patches ? Json(a.patches->patches.size()) : Json();
     json["cells_without_patch"] = a.patches ? Json(a.patches->cellsWithout) : Json();
     json["patch_bytes"] = a.patches ? Json(a.patches->bytes()) : Json();
+    json["gdm"] = a.gdm ? Json::array({a.gdm->table.nodes.x, a.gdm->table.nodes.y, a.gdm->table.nodes.z}) : Json();
+    json["gdm_rank"] = a.gdm ? Json(a.gdm->factors ? a.gdm->factors->rank : 0) : Json();
+    json["gdm_bytes"] = a.gdm ? Json(a.gdm->bytes()) : Json();
+    json["guess_bytes"] = a.guesses ? Json(a.guesses->bytes()) : Json();
     json["field_bytes"] = a.field ? Json(a.field->bytes()) : Json();
     return json;
 }
@@ -163,6 +191,14 @@ std::string summary(const std::string& file, uint64_t fileBytes, const Asset& a)
         text += fmt::format("\n  patches     {}, {}; {} cells with surface have none",
                             formatCount(a.patches->patches.size()), formatBytes(a.patches->bytes()),
                             formatCount(a.patches->cellsWithout));
+    if (a.gdm) {
+        const DistanceTable& t = a.gdm->table;
+        text += fmt::format("\n  gdm         {} x {} x {} points, {} x {} directions, {}, {}", t.nodes.x, t.nodes.y,
+                            t.nodes.z, t.directions.thetas, t.directions.phis,
+                            a.gdm->factors ? fmt::format("rank {}", a.gdm->factors->rank) : "all distances",
+                            formatBytes(a.gdm->bytes()));
+    }
+    if (a.guesses) text += fmt::format("\n  guesses     {}", formatBytes(a.guesses->bytes()));
     if (a.field) {
         const glm::ivec3 n = a.field->grid.cells;
         text += fmt::format("\n  samples     {} x {} x {}, {}", n.x, n.y, n.z + 1, formatBytes(a.field->bytes()));
@@ -185,7 +221,18 @@ Result<int> runBuild(const BuildMeso& command) {
     const auto shape = shapeOf(asset);
     if (!shape) return named(shape.error());
     VCP_TRY_ASSIGN(options.cells, cellsOf(command.grid, (*shape)->extent()));
+    VCP_TRY_ASSIGN(options.gdm, displacementOf(command, (*shape)->extent()));
+    const InterruptScope catching;
+    ProgressDisplay display(command.report.progressStyle(), stderr);
+    if (options.gdm)
+        options.gdm->traced.shareOut = [&display](size_t count, const auto& fill) {
+            return shareOut(count, fill, [&display](double part) {
+                display.update("distances", part);
+                return !interrupted();
+            });
+        };
     if (const auto built = buildAsset(asset, options); !built) return named(built.error());
+    display.finish();
     VCP_TRY_ASSIGN(const auto bytes, writeAsset(command.out, asset, rules));
     Json json = toJson(command.out, bytes, asset);
     json["seconds"] = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -256,6 +303,23 @@ RunCommand addMesoBuild(CLI::App& meso) {
         ->check(CLI::IsMember({"direct", "fitted"}));
     app->add_flag("--no-boxes", command->noBoxes, "Without octant boxes");
     app->add_flag("--no-patches", command->noPatches, "Without quadrics");
+    app->add_option("--gdm", command->gdm,
+                    "With a generalized displacement map of so many points along x, or 64x64x32 (methods gdm, "
+                    "gdm-visibility)")
+        ->type_name("N");
+    app->add_option("--directions", command->directions, "Its directions: elevations x azimuths")
+        ->type_name("MxN")
+        ->capture_default_str();
+    app->add_option("--rank", command->rank, "Its terms; 0 keeps all distances")
+        ->type_name("N")
+        ->capture_default_str()
+        ->check(CLI::Range(0, kMostRank));
+    app->add_option("--bits", command->bits, "Bits of its values")
+        ->capture_default_str()
+        ->check(CLI::IsMember({8, 16}));
+    app->add_flag("--no-visibility", command->noVisibility, "Without the bits that say what is hit, as published");
+    app->add_flag("--guesses", command->guesses, "With guesses of safe lengths (method gdm-safe)");
+    addMemory(*app, command->memoryBytes, "Memory for the map's distances [1G]");
     app->add_option("--up", command->up, "The mesh's axis out of the surface")
         ->capture_default_str()
         ->check(CLI::IsMember({"x", "y", "z"}));
@@ -263,6 +327,7 @@ RunCommand addMesoBuild(CLI::App& meso) {
                     "After how much the mesh repeats, in its units [it stands alone in its tile]")
         ->type_name("X,Y");
     addJsonOption(*app, command->report);
+    addProgressOption(*app, command->report);
     return [command] { return runBuild(*command); };
 }
 

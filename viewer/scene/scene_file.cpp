@@ -189,7 +189,7 @@ private:
         if (!isObject(json, at)) return made;
         onlyKeys(json, at,
                  {"asset", "surface", "subdivide", "tiles", "height", "translate", "scale", "up", "colour", "texture",
-                  "normal_texture", "method", "grid", "cones", "steps", "base", "far"});
+                  "normal_texture", "method", "grid", "cones", "steps", "rank", "directions", "base", "far"});
         if (!json.contains("asset"))
             wrong(at, "\"asset\" is missing");
         else
@@ -214,6 +214,8 @@ private:
         if (json.contains("grid")) made.method.cells = whole(json["grid"], at + "/grid", meso::kMaxGridEdge);
         if (json.contains("cones")) made.method.cones = cones(json["cones"], at + "/cones");
         if (json.contains("steps")) made.method.steps = whole(json["steps"], at + "/steps", kMostSteps);
+        if (json.contains("rank")) made.method.rank = upTo(json["rank"], at + "/rank", meso::kMostRank);
+        if (json.contains("directions")) made.method.directions = directions(json["directions"], at + "/directions");
         if (json.contains("base")) made.withBase = flag(json["base"], at + "/base");
         if (json.contains("far")) made.withFar = flag(json["far"], at + "/far");
         return made;
@@ -237,12 +239,14 @@ private:
         return name;
     }
 
-    int times(const Json& json, const std::string& at) {
+    int upTo(const Json& json, const std::string& at, int most) {
         const double count = json.is_number() ? json.get<double>() : -1;
-        if (!(count >= 0 && count <= meso::kMostSubdivisions && count == std::floor(count)))
-            return wrong(at, fmt::format("must be a whole number from 0 to {}", meso::kMostSubdivisions)), 0;
+        if (!(count >= 0 && count <= most && count == std::floor(count)))
+            return wrong(at, fmt::format("must be a whole number from 0 to {}", most)), 0;
         return int(count);
     }
+
+    int times(const Json& json, const std::string& at) { return upTo(json, at, meso::kMostSubdivisions); }
 
     float opacity(const Json& json, const std::string& at) {
         const double part = number(json, at);
@@ -279,6 +283,12 @@ private:
         if (!json.is_array() || json.size() != 2)
             return wrong(at, "must be two whole numbers: azimuths, elevations"), meso::Cones{};
         return {whole(json[0], at, meso::kMostAzimuths), whole(json[1], at, meso::kMostElevations)};
+    }
+
+    glm::ivec2 directions(const Json& json, const std::string& at) {
+        if (!json.is_array() || json.size() != 2)
+            return wrong(at, "must be two whole numbers: elevations, azimuths"), meso::MethodOptions().directions;
+        return {whole(json[0], at, 64), whole(json[1], at, 64)};
     }
 
     [[nodiscard]] std::string fileNamed(const std::string& file) const {

@@ -50,6 +50,9 @@ Json surfaceJson(const MesoSurfaceDescription& surface) {
     if (cones.azimuth != usualCones.azimuth || cones.elevation != usualCones.elevation)
         json["cones"] = Json::array({cones.azimuth, cones.elevation});
     put("steps", surface.method.steps, usual.method.steps);
+    put("rank", surface.method.rank, usual.method.rank);
+    if (surface.method.directions != usual.method.directions)
+        json["directions"] = Json::array({surface.method.directions.x, surface.method.directions.y});
     put("base", surface.withBase, usual.withBase);
     put("far", surface.withFar, usual.withFar);
     return json;

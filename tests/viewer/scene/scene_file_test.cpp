@@ -136,6 +136,8 @@ TEST(SceneFile, WhatIsWrittenIsReadAgain) {
     surface.method.cells = 32;
     surface.method.cones = {2, 2};
     surface.method.steps = 7;
+    surface.method.rank = 0;
+    surface.method.directions = {8, 12};
     surface.withBase = surface.withFar = false;
     scene.lights = {{true, glm::vec3(0.6f, 0, 0.8f), 1}, {false, glm::vec3(0, 1, 0), 0.25f}};
     scene.camera = OrbitCamera();
@@ -175,6 +177,8 @@ TEST(SceneFile, WhatIsWrittenIsReadAgain) {
     EXPECT_EQ(read->surfaces[0].method.cells, 32);
     EXPECT_EQ(read->surfaces[0].method.cones.count(), 4);
     EXPECT_EQ(read->surfaces[0].method.steps, 7);
+    EXPECT_EQ(read->surfaces[0].method.rank, 0);
+    EXPECT_EQ(read->surfaces[0].method.directions, glm::ivec2(8, 12));
     EXPECT_FALSE(read->surfaces[0].withBase || read->surfaces[0].withFar);
     ASSERT_TRUE(read->lights.size() == 2 && read->camera);
     for (size_t i = 0; i < 2; ++i) {
