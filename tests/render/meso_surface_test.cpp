@@ -76,11 +76,15 @@ TEST_F(MesoSurfaces, PlateauOnAQuadIsAPlane) {
         // Distance maps alone show whole cells.
         const bool isCells = method == "dm" || method == "ddm";
         // A step for linear search, a hundredth of the slab for relief mapping; what a sampled distance may be too long
-        // for sphere tracing.
+        // for sphere tracing. Displacement maps bend between their points, slices are seen where they lie: both are a
+        // third of the slab apart.
+        const bool isMap = method == "gdm" || method == "gdm-visibility" || method == "vdm";
         const double tolerance = isCells                        ? 0.13
                                  : method == "relief-linear"    ? 0.5 / 32
                                  : method.starts_with("relief") ? 0.006
                                  : method == "sphere"           ? 0.07
+                                 : isMap                        ? 0.06
+                                 : method == "slices"           ? 0.5 / 3
                                                                 : 2e-3;
         for (uint32_t y = 0; y < kEdge; ++y)
             for (uint32_t x = 0; x < kEdge; ++x) {
