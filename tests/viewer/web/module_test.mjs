@@ -1,0 +1,212 @@
+// The viewer for browsers without a browser: its module opens, streams and draws a scan; wrong servers and hostile files
+// end in one line. Usage: node module_test.mjs WEB_FOLDER SCAN.vcp SEEDS [VIEW]...
+// VIEW.json: a camera; VIEW.pfm: the depth that the program sees from there, 320 x 200.
+import assert from 'node:assert/strict';
+import fs from 'node:fs';
+import path from 'node:path';
+import { pathToFileURL } from 'node:url';
+
+const [web, scan, seeds, ...natives] = process.argv.slice(2);
+const { Module } = await import(pathToFileURL(path.join(web, 'module.js')));
+const { Ranges, joined, parseContentRange } = await import(pathToFileURL(path.join(web, 'ranges.js')));
+const { Orbit, kFieldOfView } = await import(pathToFileURL(path.join(web, 'camera.js')));
+const wasm = fs.readFileSync(path.join(web, 'vcp.wasm'));
+const file = fs.readFileSync(scan);
+
+let checks = 0;
+async function check(name, run) {
+    await run();
+    ++checks;
+    console.log(`ok ${name}`);
+}
+
+/// A server of one file in memory. `change(answer)`: what it does wrong.
+function server(bytes, change = answer => answer) {
+    return async (url, { headers }) => {
+        const [first, last] = /bytes=(\d+)-(\d+)/.exec(headers.Range).slice(1).map(Number);
+        const part = bytes.subarray(first, Math.min(last + 1, bytes.length));
+        return change(new Response(part, {
+            status: 206, headers: { 'Content-Range': `bytes ${first}-${first + part.length - 1}/${bytes.length}` },
+        }));
+    };
+}
+const quick = ranges => Object.assign(ranges, { delay: 1 });
+
+async function supply(module, ranges) {
+    for (const { offset, bytes } of joined(module.missing(), 32 << 10, 256 << 10))
+        module.supply(offset, await ranges.read(offset, bytes));
+}
+
+async function opened(ranges, budget = 64 << 20) {
+    const module = await Module.load(wasm);
+    const lead = await ranges.read(0, 64 << 10);
+    module.begin(ranges.size, 'scan.vcp', budget);
+    module.supply(0, lead);
+    while (!module.open()) await supply(module, ranges);
+    return module;
+}
+
+function look(module, orbit, width = 320, height = 200, errorPixels = 0.5) {
+    const { up, forward } = orbit.axes();
+    module.look([...orbit.eye(), ...forward, ...up, kFieldOfView, width, height, errorPixels, 0, 0, 0, 0, 0, 0, 0, 0, 0]);
+}
+
+/// Goes on until nothing is missing, as the worker does; returns the last update.
+async function settle(module, ranges, budget) {
+    for (let round = 0; round < 1000; ++round) {
+        const update = module.update();
+        assert.equal(update.problem, null);
+        assert.ok(update.residentBytes <= budget, 'the budget holds');
+        if (update.drawable && update.awaitsRays) module.render();
+        if (update.settled) {
+            module.render();
+            return update;
+        }
+        await supply(module, ranges);
+    }
+    assert.fail('it does not settle');
+}
+
+const hitsOf = depth => depth.reduce((sum, x) => sum + (Number.isFinite(x) ? 1 : 0), 0);
+
+await check('content ranges', () => {
+    assert.deepEqual(parseContentRange('bytes 0-9/20'), { first: 0, last: 9, size: 20 });
+    for (const wrong of [null, '', 'bytes */20', 'bytes 9-0/20', 'bytes 0-20/20', 'bytes 0-9/*'])
+        assert.equal(parseContentRange(wrong), null);
+});
+
+await check('stretches are joined', () => {
+    const far = [{ offset: 100, bytes: 10 }, { offset: 0, bytes: 10 }, { offset: 12, bytes: 4 }];
+    assert.deepEqual(joined(far, 2, 1000), [{ offset: 0, bytes: 16 }, { offset: 100, bytes: 10 }]);
+    assert.equal(joined(far, 2, 12).length, 3);
+});
+
+await check('first picture: at most 3 requests and 400 KB', async () => {
+    const ranges = new Ranges('scan.vcp', server(file));
+    const module = await opened(ranges), orbit = new Orbit(), info = module.info();
+    orbit.fit(info.boundsMin, info.boundsMax, 1.6);
+    look(module, orbit);
+    let update = module.update();
+    while (!update.drawable) {
+        await supply(module, ranges);
+        update = module.update();
+    }
+    module.render();
+    assert.ok(hitsOf(module.depth(320, 200)) > 3000);
+    assert.ok(ranges.requests <= 3, `${ranges.requests} requests`);
+    assert.ok(ranges.bytes <= 400e3, `${ranges.bytes} bytes`);
+    console.log(`   ${ranges.requests} requests, ${ranges.bytes} bytes`);
+});
+
+await check('whole and close: settles within the budget, antialiases', async () => {
+    for (const budget of [64 << 20, 2 << 20]) {
+        const ranges = new Ranges('scan.vcp', server(file)), module = await opened(ranges, budget), info = module.info();
+        const orbit = new Orbit();
+        orbit.fit(info.boundsMin, info.boundsMax, 1.6);
+        for (const nearer of [1, 0.2]) {
+            orbit.zoom(nearer, 0, 0);
+            look(module, orbit);
+            const update = await settle(module, ranges, budget);
+            assert.ok(hitsOf(module.depth(320, 200)) > 3000);
+            if (!update.relaxed && nearer === 1) assert.ok(update.errorPixels <= 0.5 || info.certifiedError > 0);
+            assert.equal(module.refine(), 2);
+            const hit = module.pick(160, 100);
+            assert.ok(hit && hit.error > 0 && hit.depth > 0);
+        }
+    }
+});
+
+for (const name of natives) await check(`the picture is the native one: ${name}`, async () => {
+    const text = fs.readFileSync(`${name}.pfm`), [width, height] = [320, 200], floats = text.subarray(text.length - 4 * width * height);
+    const camera = JSON.parse(fs.readFileSync(`${name}.json`)), forward = camera.target.map((x, i) => x - camera.position[i]);
+    const ranges = new Ranges('scan.vcp', server(file)), module = await opened(ranges), info = module.info();
+    module.look([...camera.position, ...forward, 0, 1, 0, camera.fov_degrees * Math.PI / 180, width, height, 0.5,
+        0, 0, 0, 0, 0, 0, 0, 0, 0]);
+    await settle(module, ranges, 64 << 20);
+    const ours = module.depth(width, height);
+    let differ = 0, hits = 0;
+    for (let y = 0; y < height; ++y)
+        for (let x = 0; x < width; ++x) {
+            const theirs = floats.readFloatLE(4 * ((height - 1 - y) * width + x)), depth = ours[y * width + x];
+            const isHit = Number.isFinite(depth);
+            hits += isHit ? 1 : 0;
+            if (isHit !== Number.isFinite(theirs) || (isHit && Math.abs(depth - theirs) > 1e-3 * info.cell)) ++differ;
+        }
+    console.log(`   ${differ} of ${width * height} pixels differ beyond 1e-3 cell; ${hits} hits`);
+    assert.ok(hits > 3000 && differ <= width * height / 1000);
+});
+
+await check('servers that do wrong end in one line', async () => {
+    const says = async (change, expected, requests) => {
+        const ranges = quick(new Ranges('scan.vcp', server(file, change)));
+        await assert.rejects(opened(ranges), error => expected.test(error.message) && !error.message.includes('\n'));
+        if (requests) assert.equal(ranges.requests, requests);
+    };
+    await says(() => new Response(file, { status: 200 }), /ignores ranges/, 1);
+    await says(() => new Response('', { status: 404 }), /no such file/, 1);
+    await says(() => new Response('', { status: 503 }), /answers 503/, 4);
+    await says(answer => new Response(answer.body, { status: 206, headers: { 'Content-Range': 'bytes 7-9/99' } }), /another range/, 1);
+    await says(answer => new Response(answer.body, { status: 206 }), /hides Content-Range/, 1);
+});
+
+await check('a file replaced while it is seen', async () => {
+    let tag = '"a"';
+    const ranges = quick(new Ranges('scan.vcp', server(file, answer => (answer.headers.set('ETag', tag), answer))));
+    await ranges.read(0, 100);
+    tag = '"b"';
+    await assert.rejects(ranges.read(100, 100), /replaced/);
+});
+
+await check('a damaged page is reported and its parent drawn', async () => {
+    const whole = new Ranges('scan.vcp', server(file)), info = (await opened(whole)).info();
+    if (info.pages < 4) return;
+    const broken = Buffer.from(file);
+    broken[file.length - 64 - 300] ^= 1; // in the last page
+    const ranges = quick(new Ranges('scan.vcp', server(broken))), module = await opened(ranges), orbit = new Orbit();
+    orbit.fit(info.boundsMin, info.boundsMax, 1.6);
+    orbit.zoom(0.05, 0, 0);
+    look(module, orbit, 320, 200, 1e-3);
+    let problem = null, update;
+    for (let round = 0; round < 300 && !update?.settled; ++round) {
+        update = module.update();
+        problem ??= update.problem;
+        if (update.drawable && update.awaitsRays) module.render();
+        await supply(module, ranges);
+    }
+    assert.ok(update.settled);
+    assert.match(problem ?? '', /page \d+.*hash does not match/);
+});
+
+await check('every bit of the first block flipped: refused in one line, or harmless', async () => {
+    const module = await Module.load(wasm);
+    for (let bit = 0; bit < 8 * 256; bit += 7) {
+        const broken = Buffer.from(file);
+        broken[bit >> 3] ^= 1 << (bit & 7);
+        module.begin(broken.length, 'scan.vcp', 8 << 20);
+        module.supply(0, broken);
+        assert.throws(() => module.open(), error => error.message.length > 0 && !error.message.includes('\n'));
+    }
+});
+
+await check('the seeds of the reader of files', async () => {
+    let count = 0;
+    for (const name of fs.readdirSync(seeds)) {
+        const bytes = fs.readFileSync(path.join(seeds, name)), module = await Module.load(wasm);
+        module.begin(bytes.length, name, 8 << 20);
+        module.supply(0, bytes);
+        try {
+            assert.ok(module.open());
+            const orbit = new Orbit(), info = module.info();
+            orbit.fit(info.boundsMin, info.boundsMax, 1);
+            look(module, orbit, 32, 32);
+            for (let round = 0; round < 20; ++round) if (module.update().drawable) module.render();
+        } catch (error) {
+            assert.ok(!(error instanceof WebAssembly.RuntimeError), `${name}: ${error.message}`);
+        }
+        assert.ok(module.memoryBytes() < 256 << 20);
+        ++count;
+    }
+    console.log(`   ${count} files`);
+});
+
+console.log(`${checks} checks passed`);

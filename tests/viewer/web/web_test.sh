@@ -1,0 +1,21 @@
+#!/usr/bin/env bash
+# The viewer for browsers against the program: web_test.sh NODE WEB_FOLDER VCP MAKE_SCAN FOLDER
+set -euo pipefail
+node=$1 web=$2 vcp=$3 make_scan=$4 folder=$5
+if [ ! -e "$web/vcp.wasm" ]; then
+    echo "The target web was not built: skipped"
+    exit 77
+fi
+here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
+mkdir -p "$folder"
+cd "$folder"
+"$make_scan" --triangles 60000 --colour -o scan.ply
+"$vcp" build scan.ply -o scan.vcp --overwrite --progress none
+cp "$web"/*.js "$web/vcp.wasm" .
+echo '{ "type": "module" }' >package.json
+echo '{ "position": [3.5, 4, 7], "target": [0, 0.86, 0], "fov_degrees": 34 }' >whole.json
+echo '{ "position": [0.8, 1.9, 1.6], "target": [0, 1.1, 0], "fov_degrees": 34 }' >close.json
+for view in whole close; do
+    "$vcp" render scan.vcp --device host --camera $view.json --size 320x200 --depth $view.pfm -o $view.png --overwrite --progress none
+done
+"$node" "$here/module_test.mjs" "$folder" scan.vcp "$here/../../fuzz/seeds/fuzz_file" whole close

@@ -1,0 +1,77 @@
+// The camera of a viewer: it orbits a point. World space, double precision.
+
+const kLeastPitch = -1.55, kMostPitch = 1.55;
+export const kFieldOfView = 0.6; // radians, from the lower to the upper edge
+
+const add = (a, b, s = 1) => a.map((x, i) => x + s * b[i]);
+export const length = a => Math.hypot(...a);
+export const difference = (a, b) => add(a, b, -1);
+
+export class Orbit {
+    constructor() {
+        this.target = [0, 0, 0];
+        this.distance = 1;
+        this.yaw = 0.6;
+        this.pitch = 0.35;
+    }
+
+    /// Looks at the whole box from the direction that it has.
+    fit(boundsMin, boundsMax, aspect) {
+        this.target = boundsMin.map((x, i) => (x + boundsMax[i]) / 2);
+        const radius = length(difference(boundsMax, boundsMin)) / 2 || 1;
+        this.radius = radius;
+        this.distance = radius / Math.sin(kFieldOfView / 2) / Math.min(1, aspect) * 0.8;
+    }
+
+    /// Unit axes: right, up and forward.
+    axes() {
+        const [cy, sy, cp, sp] = [Math.cos(this.yaw), Math.sin(this.yaw), Math.cos(this.pitch), Math.sin(this.pitch)];
+        return { right: [cy, 0, -sy], up: [-sy * sp, cp, -cy * sp], forward: [-sy * cp, -sp, -cy * cp] };
+    }
+    eye() {
+        return add(this.target, this.axes().forward, -this.distance);
+    }
+
+    /// Turns by pixels of a picture so many pixels high.
+    turn(dx, dy, height) {
+        this.yaw -= 3.2 * dx / height;
+        this.pitch = Math.min(Math.max(this.pitch + 3.2 * dy / height, kLeastPitch), kMostPitch);
+    }
+    /// Moves the target so that what is at its distance follows the pointer.
+    pan(dx, dy, height) {
+        const unit = 2 * this.distance * Math.tan(kFieldOfView / 2) / height;
+        const { right, up } = this.axes();
+        this.target = add(add(this.target, right, -dx * unit), up, dy * unit);
+    }
+    /// Comes nearer by a factor below 1, or goes away; the point under (x, y), in half heights from the middle, stays.
+    zoom(factor, x, y) {
+        const distance = Math.min(Math.max(this.distance * factor, this.radius * 1e-5), this.radius * 50);
+        const moved = (this.distance - distance) * Math.tan(kFieldOfView / 2);
+        const { right, up } = this.axes();
+        this.target = add(add(this.target, right, x * moved), up, -y * moved);
+        this.distance = distance;
+    }
+
+    /// The camera as a link has it, and back; false where the text is none.
+    toText() {
+        return [...this.target, this.distance, this.yaw, this.pitch].map(x => Number(x.toPrecision(9))).join(',');
+    }
+    fromText(text) {
+        const n = text.split(',').map(Number);
+        if (n.length !== 6 || !n.every(Number.isFinite) || !(n[3] > 0)) return false;
+        this.target = n.slice(0, 3);
+        [this.distance, this.yaw, this.pitch] = n.slice(3);
+        this.pitch = Math.min(Math.max(this.pitch, kLeastPitch), kMostPitch);
+        return true;
+    }
+
+    /// Where a world point is seen in a picture, in pixels; null behind the eye.
+    project(point, width, height) {
+        const { right, up, forward } = this.axes(), to = difference(point, this.eye());
+        const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+        const depth = dot(to, forward);
+        if (!(depth > 0)) return null;
+        const scale = height / 2 / Math.tan(kFieldOfView / 2) / depth;
+        return { x: width / 2 + dot(to, right) * scale, y: height / 2 - dot(to, up) * scale, depth };
+    }
+}

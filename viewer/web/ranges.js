@@ -1,0 +1,103 @@
+// Reads stretches of a file from a web server: one range a request, nothing that would preflight across origins.
+
+const kAttempts = 4;
+const kFirstDelay = 300; // ms; twice as long after each failure
+
+/// What went wrong with the server: a line for people. Trying again does not help.
+export class ServerError extends Error {}
+
+/// Returns the first byte and the size of the whole file that a Content-Range names; nothing where it is none.
+export function parseContentRange(text) {
+    const match = /^bytes (\d+)-(\d+)\/(\d+)$/.exec(text ?? '');
+    if (!match) return null;
+    const [first, last, size] = match.slice(1).map(Number);
+    return first <= last && last < size ? { first, last, size } : null;
+}
+
+/// Joins stretches that lie at most `gap` bytes from each other, up to `most` bytes together.
+export function joined(stretches, gap, most) {
+    const sorted = [...stretches].sort((a, b) => a.offset - b.offset);
+    const runs = [];
+    for (const { offset, bytes } of sorted) {
+        const run = runs[runs.length - 1];
+        const end = Math.max(offset + bytes, run ? run.offset + run.bytes : 0);
+        if (run && offset <= run.offset + run.bytes + gap && end - run.offset <= most) run.bytes = end - run.offset;
+        else runs.push({ offset, bytes });
+    }
+    return runs;
+}
+
+export class Ranges {
+    /// `fetch`: as the browser's; another one for tests.
+    constructor(url, fetch = (...all) => globalThis.fetch(...all)) {
+        this.url = url;
+        this.fetch = fetch;
+        this.size = null; // of the file, once the first answer came
+        this.requests = 0;
+        this.bytes = 0;
+        this.tag = null;
+        this.delay = kFirstDelay;
+    }
+
+    /// Returns the bytes from `offset` on, `bytes` of them, fewer where the file ends. `anew`: not from a cache.
+    async read(offset, bytes, { anew = false, signal } = {}) {
+        for (let attempt = 1; ; ++attempt) {
+            try {
+                return await this.once(offset, bytes, anew, signal);
+            } catch (error) {
+                if (error instanceof ServerError || signal?.aborted || attempt === kAttempts) throw error;
+                await new Promise(done => setTimeout(done, this.delay * 2 ** (attempt - 1)));
+            }
+        }
+    }
+
+    async once(offset, bytes, anew, signal) {
+        const abort = new AbortController();
+        signal?.addEventListener('abort', () => abort.abort(), { once: true });
+        ++this.requests;
+        const last = (this.size === null ? offset + bytes : Math.min(offset + bytes, this.size)) - 1;
+        const answer = await this.fetch(this.url, {
+            headers: { Range: `bytes=${offset}-${last}` },
+            cache: anew ? 'reload' : 'default',
+            signal: abort.signal,
+        });
+        try {
+            this.check(answer, offset);
+        } catch (error) {
+            abort.abort(); // the rest of a whole file is not downloaded
+            throw error;
+        }
+        const got = new Uint8Array(await answer.arrayBuffer());
+        this.bytes += got.length;
+        if (got.length > last - offset + 1) throw new ServerError(`${this.url}: the server sent more bytes than asked for`);
+        if (this.size !== null && got.length < last - offset + 1)
+            throw new Error(`${this.url}: the answer was cut off`);
+        return got;
+    }
+
+    check(answer, offset) {
+        if (answer.status === 200)
+            throw new ServerError(`${this.url}: the server ignores ranges and sends the whole file; use one that knows Range requests`);
+        if (answer.status === 404) throw new ServerError(`${this.url}: the server has no such file`);
+        if (answer.status === 416)
+            throw new ServerError(`${this.url}: the file on the server is shorter than before; reload the page`);
+        if (answer.status >= 400 && answer.status < 500 && answer.status !== 408 && answer.status !== 429)
+            throw new ServerError(`${this.url}: the server answers ${answer.status}`);
+        if (answer.status !== 206) throw new Error(`${this.url}: the server answers ${answer.status}`);
+        const encoding = answer.headers.get('Content-Encoding');
+        if (encoding && encoding !== 'identity')
+            throw new ServerError(`${this.url}: the server compresses ranges (${encoding}); switch that off for .vcp`);
+        const range = parseContentRange(answer.headers.get('Content-Range'));
+        // Across origins the header may be hidden; then the hashes alone say what came.
+        if (range && range.first !== offset) throw new ServerError(`${this.url}: the server sent another range than asked for`);
+        if (range && this.size !== null && range.size !== this.size)
+            throw new ServerError(`${this.url}: the file was replaced on the server; reload the page`);
+        const tag = answer.headers.get('ETag');
+        if (tag && this.tag && tag !== this.tag)
+            throw new ServerError(`${this.url}: the file was replaced on the server; reload the page`);
+        this.tag ??= tag;
+        if (this.size === null && range) this.size = range.size;
+        if (this.size === null)
+            throw new ServerError(`${this.url}: the server hides Content-Range; it must send Access-Control-Expose-Headers: Content-Range`);
+    }
+}
