@@ -70,11 +70,12 @@ const std::vector<Room>& rooms() {
          {"octree/", "builder/", "mesostructure", "streaming", "render", "viewer/scene", "viewer",
           "viewer/bench/report", "viewer/bench/rays"}},
         {"viewer/command/manual", {}},
+        {"viewer/command/site", {"octree/"}},
         {"viewer/command/terminal", {"viewer/scene"}},
         {"viewer/command",
          {"octree/", "builder/", "mesostructure/", "streaming", "render", "viewer/annotation", "viewer/camera",
           "viewer/scene", "viewer/picture", "viewer/asset", "viewer/export", "viewer", "viewer/window", "viewer/bench/",
-          "viewer/command/manual", "viewer/command/terminal"}},
+          "viewer/command/manual", "viewer/command/site", "viewer/command/terminal"}},
         {"viewer/examples", {}},
 
         {"datasets_scripts", {"octree/", "builder/"}},

@@ -38,6 +38,8 @@ Command addStress(CLI::App& vcp);
 Command addBench(CLI::App& vcp);
 Command addDevices(CLI::App& vcp);
 Command addMeso(CLI::App& vcp);
+Command addPublish(CLI::App& vcp);
+Command addServe(CLI::App& vcp);
 /// Hidden commands, for the build and for packages.
 Command addManual(CLI::App& vcp);
 Command addCompletions(CLI::App& vcp);
