@@ -69,8 +69,8 @@ protected:
 };
 std::unique_ptr<TestFolder> CommandLine::folder_;
 
-constexpr const char* kCommands[] = {"build",   "info",   "verify",  "render", "view", "export",
-                                     "compare", "stress", "devices", "bench",  "meso"};
+constexpr const char* kCommands[] = {"build",  "info",    "verify", "render", "view",    "export", "compare",
+                                     "stress", "devices", "bench",  "meso",   "publish", "serve"};
 
 TEST_F(CommandLine, HelpOfEveryCommandBothWays) {
     const Ran all = run({"--help"});
