@@ -42,7 +42,7 @@ template <class Real>
 struct RemeshFrame {
     glm::vec<3, Real> byU{0}, byV{0}, directionByU{0}, directionByV{0};
     glm::vec<3, Real> flat{0};  ///< the triangle's own normal
-    Real turned = 0;            ///< 1, -1 where the map is mirrored, 0 where it has no area
+    Real turned = 0;            ///< sign of a product of derivatives that points outwards; 0 where the map has no area
 };
 
 /// What stays the same over a frame.

@@ -164,13 +164,14 @@ private:
     static RemeshFrame<Real> frameOf(const Piece& piece) {
         const auto& c = piece.corners;
         RemeshFrame<Real> frame;
-        const Real3 flat = glm::cross(c[1].position - c[0].position, c[2].position - c[0].position);
+        // Eye space is left-handed: products are turned.
+        const Real3 flat = glm::cross(c[2].position - c[0].position, c[1].position - c[0].position);
         const Real length = glm::length(flat);
         frame.flat = length > 0 ? flat / length : glm::normalize(c[0].direction);
         const Real2 a = c[1].uv - c[0].uv, b = c[2].uv - c[0].uv;
         const Real area = a.x * b.y - a.y * b.x;
         if (!(std::abs(area) > Real(1e-12) * (glm::dot(a, a) + glm::dot(b, b)))) return frame;
-        frame.turned = area > 0 ? Real(1) : Real(-1);
+        frame.turned = area > 0 ? Real(-1) : Real(1);
         const auto byU = [&](const Real3& x, const Real3& y) { return (b.y * x - a.y * y) / area; };
         const auto byV = [&](const Real3& x, const Real3& y) { return (a.x * y - b.x * x) / area; };
         const Real3 p1 = c[1].position - c[0].position, p2 = c[2].position - c[0].position,

@@ -11,6 +11,7 @@
 
 #include "render/meso_shade_spirv.h"
 #include "render/meso_surface_spirv.h"
+#include "render/remesh_merge_spirv.h"
 
 namespace vcp {
 
@@ -35,6 +36,8 @@ std::vector<uint64_t> lookOf(const MesoSurface& surface, frame::MesoView& view) 
     return texels;
 }
 
+RemeshLook remeshLook(const MesoLook& look, PictureSize size) { return {look.camera, look.tile, look.upperLeft, size}; }
+
 }  // namespace
 
 double shadowLift(const meso::MarchArrays& arrays, double tileEdge) {
@@ -50,6 +53,7 @@ double shadowLift(const meso::MarchArrays& arrays, double tileEdge) {
 
 Result<void> MesoSurfacePass::setSurfaces(std::span<const MesoSurface> surfaces) {
     surfaces_.clear();
+    remeshed_ = 0;
     ++version_;
     std::map<const meso::MarchArrays*, std::shared_ptr<MesoTexels>> uploaded;
     std::map<std::tuple<const meso::Appearance*, const MesoTexture*, const MesoTexture*>, std::shared_ptr<MesoTexels>>
@@ -57,13 +61,17 @@ Result<void> MesoSurfacePass::setSurfaces(std::span<const MesoSurface> surfaces)
     std::vector<Placed> placed;
     for (const MesoSurface& surface : surfaces) {
         Placed made;
+        made.remeshed = surface.remeshed;
+        if (made.remeshed.surface) made.number = remeshed_++;
         made.arrays = surface.arrays;
-        auto& words = uploaded[surface.arrays.get()];
-        if (!words) {
-            VCP_TRY_ASSIGN(auto texels, resources_.words(surface.arrays->words));
-            words = std::make_shared<MesoTexels>(std::move(texels));
+        if (surface.arrays) {
+            auto& words = uploaded[surface.arrays.get()];
+            if (!words) {
+                VCP_TRY_ASSIGN(auto texels, resources_.words(surface.arrays->words));
+                words = std::make_shared<MesoTexels>(std::move(texels));
+            }
+            made.words = words;
         }
-        made.words = words;
         const std::vector<uint64_t> texels = lookOf(surface, made.view);
         auto& look = looks[{surface.far.get(), surface.colours.get(), surface.normals.get()}];
         if (!look && !texels.empty()) {
@@ -74,8 +82,10 @@ Result<void> MesoSurfacePass::setSurfaces(std::span<const MesoSurface> surfaces)
         // A surface that rays may come through must be marched.
         made.isFarDrawn = surface.far && (surface.withBase || surface.far->isOpaque);
         made.view.meanHeight = made.isFarDrawn ? float(surface.far->height) : 0.0f;
-        VCP_TRY_ASSIGN(auto shell, resources_.vectors(surface.shell.texels));
-        made.shell = std::move(shell);
+        if (!made.remeshed.surface) {
+            VCP_TRY_ASSIGN(auto shell, resources_.vectors(surface.shell.texels));
+            made.shell = std::move(shell);
+        }
         VCP_TRY_ASSIGN(made.constants, device_.createBuffer(sizeof(MesoConstants), kConstantsUse, MemoryUse::Local));
         made.origin = surface.shell.origin;
         made.view.nodes = surface.shell.nodes;
@@ -92,49 +102,74 @@ uint64_t MesoSurfacePass::assetBytes() const {
     std::map<const MesoTexels*, uint64_t> bytes;
     uint64_t sum = 0;
     for (const Placed& surface : surfaces_) {
-        bytes[surface.words.get()] = surface.words->buffer.bytes(), sum += surface.shell.buffer.bytes();
+        if (surface.remeshed.surface)
+            sum += surface.remeshed.surface->heights->bytes();
+        else
+            bytes[surface.words.get()] = surface.words->buffer.bytes(), sum += surface.shell.buffer.bytes();
         if (surface.look) bytes[surface.look.get()] = surface.look->buffer.bytes();
     }
     for (const auto& [texels, count] : bytes) sum += count;
     return sum;
 }
 
-Result<void> MesoSurfacePass::prepare(MesoTarget& target, PictureSize size, const Buffer& picture, bool shadows) {
-    if (!(size == target.size) || target.surfaces != version_ || target.picture != picture.handle()) {
-        // The target has no size until all of it is made.
-        target = {};
-        for (const auto& [buffer, bytes] : {std::pair(&target.hits, size.pixels() * frame::kMesoPlanes * 4),
-                                            std::pair(&target.counters, uint64_t{sizeof(MesoCounts)})}) {
-            VCP_TRY_ASSIGN(*buffer, resources_.storage(bytes));
-        }
-        VCP_TRY_ASSIGN(target.reported,
-                       device_.createBuffer(sizeof(MesoReport), VK_BUFFER_USAGE_TRANSFER_DST_BIT, MemoryUse::Readback));
-        for (const Placed& surface : surfaces_) {
-            VCP_TRY_ASSIGN(auto set,
-                           resources_.makeSet({&surface.constants, surface.words.get(), &surface.shell, &target.hits,
-                                               &picture, &target.counters, surface.look.get()}));
-            target.sets.push_back(std::move(set));
-        }
-        target.size = size, target.surfaces = version_, target.picture = picture.handle();
+Result<void> MesoSurfacePass::makeTarget(MesoTarget& target, PictureSize size, const Buffer& picture) {
+    // The target has no size until all of it is made.
+    target = {};
+    for (const auto& [buffer, bytes] : {std::pair(&target.hits, size.pixels() * frame::kMesoPlanes * 4),
+                                        std::pair(&target.counters, uint64_t{sizeof(MesoCounts)})}) {
+        VCP_TRY_ASSIGN(*buffer, resources_.storage(bytes));
     }
+    VCP_TRY_ASSIGN(target.reported,
+                   device_.createBuffer(sizeof(MesoReport), VK_BUFFER_USAGE_TRANSFER_DST_BIT, MemoryUse::Readback));
+    if (remeshed_ > 0) VCP_TRY(raster_.prepare(target.remeshed, size, remeshed_));
+    for (const Placed& surface : surfaces_) {
+        const bool isRemeshed = surface.remeshed.surface != nullptr;
+        const auto& [hits, normals] = target.remeshed.copies;
+        VCP_TRY_ASSIGN(auto set, resources_.makeSet({&surface.constants, isRemeshed ? &normals : surface.words.get(),
+                                                     isRemeshed ? &hits : &surface.shell, &target.hits, &picture,
+                                                     &target.counters, surface.look.get()}));
+        target.sets.push_back(std::move(set));
+    }
+    target.size = size, target.surfaces = version_, target.picture = picture.handle();
+    return {};
+}
+
+Result<void> MesoSurfacePass::choosePipelines(Placed& surface, bool shadows) {
+    std::vector<uint32_t> constants =
+        surface.arrays ? wordsOf(surface.arrays->constants) : wordsOf(meso::MarchConstants());
+    constants.push_back(0);
+    constants.push_back((surface.view.colours.levels > 0 ? frame::kMesoColours : 0) |
+                        (surface.view.normals.levels > 0 ? frame::kMesoNormals : 0));
+    if (surface.remeshed.surface) {
+        VCP_TRY_ASSIGN(surface.cast, resources_.pipeline(kRemeshMergeSpirv, constants));
+        return {};
+    }
+    constants.push_back(surface.isFarDrawn ? 1 : 0);
+    VCP_TRY_ASSIGN(surface.cast, resources_.pipeline(kMesoSurfaceSpirv, constants));
+    if (!shadows) return {};
+    // The shadow pass reads no textures.
+    constants[4] = 1, constants[5] = 0;
+    VCP_TRY_ASSIGN(surface.shadow, resources_.pipeline(kMesoSurfaceSpirv, constants));
+    return {};
+}
+
+Result<void> MesoSurfacePass::prepare(MesoTarget& target, PictureSize size, const Buffer& picture,
+                                      const MesoLook& look) {
+    if (!(size == target.size) || target.surfaces != version_ || target.picture != picture.handle())
+        VCP_TRY(makeTarget(target, size, picture));
     for (Placed& surface : surfaces_) {
-        std::vector<uint32_t> constants = wordsOf(surface.arrays->constants);
-        constants.push_back(0);
-        constants.push_back((surface.view.colours.levels > 0 ? frame::kMesoColours : 0) |
-                            (surface.view.normals.levels > 0 ? frame::kMesoNormals : 0));
-        constants.push_back(surface.isFarDrawn ? 1 : 0);
-        VCP_TRY_ASSIGN(surface.cast, resources_.pipeline(kMesoSurfaceSpirv, constants));
-        if (!shadows) continue;
-        // The shadow pass reads no textures.
-        constants[4] = 1, constants[5] = 0;
-        VCP_TRY_ASSIGN(surface.shadow, resources_.pipeline(kMesoSurfaceSpirv, constants));
+        VCP_TRY(choosePipelines(surface, look.shadows));
+        if (surface.remeshed.surface)
+            VCP_TRY(raster_.remesh(target.remeshed, surface.number, surface.remeshed, remeshLook(look, size)));
     }
     VCP_TRY_ASSIGN(shade_, resources_.pipeline(kMesoShadeSpirv, {}));
     return {};
 }
 
 MesoConstants MesoSurfacePass::constantsOf(const Placed& surface, PictureSize size, const MesoLook& look) const {
-    MesoConstants c{surface.arrays->record, surface.view};
+    MesoConstants c{surface.arrays ? surface.arrays->record : meso::f32::MesoRecord{}, surface.view};
+    // Textures are repeated with the tile.
+    if (surface.remeshed.surface) c.record.extent = glm::vec3(1, surface.remeshed.surface->heights->rows(), 1);
     const PictureTile& tile = look.tile;
     const CameraBasis basis = cameraBasis(look.camera, tile.fullWidth, tile.fullHeight);
     const glm::dvec3 stepX = basis.right * (2 * basis.halfWidth / tile.fullWidth),
@@ -191,9 +226,15 @@ void MesoSurfacePass::record(VkCommandBuffer commands, const MesoTarget& target,
         vkCmdUpdateBuffer(commands, surface.constants.handle(), 0, sizeof constants, &constants);
     }
     barrierToAll(commands);
-    for (size_t i = 0; i < surfaces_.size(); ++i) dispatch(commands, surfaces_[i].cast, target, i);
+    for (size_t i = 0; i < surfaces_.size(); ++i) {
+        if (surfaces_[i].remeshed.surface)
+            raster_.record(commands, target.remeshed, surfaces_[i].number, surfaces_[i].remeshed,
+                           remeshLook(look, target.size));
+        dispatch(commands, surfaces_[i].cast, target, i);
+    }
     if (look.shadows && look.shading == MesoShading::Lit)
-        for (size_t i = 0; i < surfaces_.size(); ++i) dispatch(commands, surfaces_[i].shadow, target, i);
+        for (size_t i = 0; i < surfaces_.size(); ++i)
+            if (!surfaces_[i].remeshed.surface) dispatch(commands, surfaces_[i].shadow, target, i);
     dispatch(commands, shade_, target, 0);
     barrierComputeToReadback(commands);
     const VkBufferCopy counts{0, offsetof(MesoReport, counts), sizeof(MesoCounts)};

@@ -1,6 +1,7 @@
 // Mesostructure on surfaces, over the picture that the datasets left (shaders/meso_surface.comp, meso_shade.comp): for
-// each surface a dispatch that finds first hits in its shell and keeps the nearest of all, then one that casts shadow
-// rays, then one that shades. Normals are as the other passes pack them; depths are in world units, as those of the
+// each surface a dispatch that finds first hits in its shell and keeps the nearest of all, or, where it is remeshed,
+// what RemeshRaster does; then one that casts shadow rays, then one that shades. Remeshed surfaces get the shadows of
+// the others and cast none. Normals are as the other passes pack them; depths are in world units, as those of the
 // compose pass, from which they start.
 //
 // Reads shells, assets and the composed depths; writes hits, picture, counters. Barriers are recorded here; ends with
@@ -19,16 +20,18 @@
 #include "render/meso_texture.h"
 #include "render/passes/frame_resources.h"
 #include "render/passes/meso_resources.h"
+#include "render/passes/remesh_raster.h"
 
 namespace vcp {
 
-/// One asset on one base surface.
+/// One asset on one base surface: marched, with arrays and a shell, or remeshed.
 struct MesoSurface {
     std::shared_ptr<const meso::MarchArrays> arrays;  ///< surfaces may share them
     meso::Shell shell;
-    glm::vec3 colour{0.8f};  ///< encoded, as the screen has it
-    bool withBase = true;    ///< the base is drawn where rays come through to it
-    double lift = 0;         ///< world units by which shadow rays start above a hit
+    RemeshedSurface remeshed;  ///< its surface is null where this one is marched; of the rest, colour and colours count
+    glm::vec3 colour{0.8f};    ///< encoded, as the screen has it
+    bool withBase = true;      ///< the base is drawn where rays come through to it
+    double lift = 0;           ///< world units by which shadow rays start above a hit
     /// A texture over the tile, at the hit's place in it, may be shared; its colours are linear and replace `colour`.
     std::shared_ptr<const MesoTexture> colours;
     /// A texture of unit vectors that bend the mesostructure's shading normals: x and y are along the tile, z points
@@ -78,7 +81,8 @@ struct MesoTarget {
     Buffer hits, counters;
     Buffer reported;                    ///< MesoReport
     VkBuffer picture = VK_NULL_HANDLE;  ///< not owned; in the sets
-    std::vector<MesoSet> sets;          ///< one for each surface
+    RemeshTarget remeshed;
+    std::vector<MesoSet> sets;  ///< one for each surface
 
     /// Returns what a frame told. Precondition: the frame is done.
     [[nodiscard]] MesoReport report() const;
@@ -86,13 +90,15 @@ struct MesoTarget {
 
 class MesoSurfacePass {
 public:
-    MesoSurfacePass(Device& device, MesoResources& resources) : device_(device), resources_(resources) {}
+    MesoSurfacePass(Device& device, MesoResources& resources)
+        : device_(device), resources_(resources), raster_(device) {}
 
     /// Replaces the surfaces; waits for nothing: no frame may be in flight. On an error there are none. Errors: Device,
     /// Limit.
     Result<void> setSurfaces(std::span<const MesoSurface> surfaces);
-    /// Makes buffers and pipelines. Precondition: there are surfaces. Errors: Device, Limit.
-    Result<void> prepare(MesoTarget& target, PictureSize size, const Buffer& picture, bool shadows);
+    /// Makes buffers and pipelines, and remeshes. Precondition: there are surfaces, and no frame in flight uses the
+    /// target. Errors: Device, Limit, Unsupported.
+    Result<void> prepare(MesoTarget& target, PictureSize size, const Buffer& picture, const MesoLook& look);
     /// Records the surfaces' passes. Precondition: prepare(); the picture shows what is seen without mesostructure.
     /// `depths`: a float a pixel, world units along the unit ray, of what the picture shows.
     void record(VkCommandBuffer commands, const MesoTarget& target, const MesoLook& look, const Buffer& depths,
@@ -107,18 +113,24 @@ private:
         std::shared_ptr<const meso::MarchArrays> arrays;
         std::shared_ptr<MesoTexels> words, look;  ///< look: null without textures
         MesoTexels shell;
+        RemeshedSurface remeshed;
+        size_t number = 0;  ///< among those that are remeshed
         Buffer constants;
         glm::dvec3 origin;
         frame::MesoView view{};  ///< what does not depend on the camera
         bool isFarDrawn = false;
         VkPipeline cast = VK_NULL_HANDLE, shadow = VK_NULL_HANDLE;
     };
+    Result<void> makeTarget(MesoTarget& target, PictureSize size, const Buffer& picture);
+    Result<void> choosePipelines(Placed& surface, bool shadows);
     MesoConstants constantsOf(const Placed& surface, PictureSize size, const MesoLook& look) const;
     void dispatch(VkCommandBuffer commands, VkPipeline pipeline, const MesoTarget& target, size_t surface) const;
 
     Device& device_;
     MesoResources& resources_;
+    RemeshRaster raster_;
     std::vector<Placed> surfaces_;
+    size_t remeshed_ = 0;  ///< number of those that are
     uint64_t version_ = 0;
     VkPipeline shade_ = VK_NULL_HANDLE;
 };

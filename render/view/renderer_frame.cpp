@@ -235,7 +235,7 @@ Result<void> Renderer::View::recordSurfaces(VkCommandBuffer commands, Frame& fra
     const Shared::Meso& meso = *shared->meso;
     const Buffer& picture = frame.layers.front().resources->picture();
     const MesoLook look = mesoLook(frame.request);
-    VCP_TRY(meso.pass->prepare(frame.surfaces, {frame.request.width, frame.request.height}, picture, look.shadows));
+    VCP_TRY(meso.pass->prepare(frame.surfaces, {frame.request.width, frame.request.height}, picture, look));
     frame.surfacesTimer.reset(commands);
     frame.surfacesTimer.mark(commands, 0);
     meso.pass->record(commands, frame.surfaces, look, frame.target.depths(), frame.cursor);

@@ -14,6 +14,7 @@
 #include "builder/measure/quantile.h"
 #include "mesostructure/method.h"
 #include "render/meso_marcher.h"
+#include "viewer/bench/bench_remesh.h"
 #include "viewer/scene/meso_scene.h"
 
 namespace vcp {
@@ -412,6 +413,11 @@ Result<BenchMesoReport> benchMeso(const BenchMesoOptions& options) {
         report.published = publishedOf(report.rows);
         VCP_TRY(compareCompression(report.published));
         compareFactors(report.published);
+        VCP_TRY_ASSIGN(const auto remeshed, remeshPublished());
+        report.published.insert(report.published.end(), remeshed.begin(), remeshed.end());
+    }
+    if (options.remesh) {
+        VCP_TRY_ASSIGN(report.remeshed, benchRemesh(assets));
     }
     return report;
 }

@@ -33,6 +33,7 @@ struct BenchMesoOptions {
     int repetitions = 3;                ///< rounds over the methods
     bool published = false;             ///< compares with the paper's tables; its Table 3 is made anew
     bool factors = false;               ///< compares the factors of displacement maps
+    bool remesh = false;                ///< measures remeshing as well (bench_remesh.h)
     uint64_t checkRays = 0;             ///< rays of the conservative test for each asset; 0: not made
     /// Called with what is being done; false cancels. May be empty.
     std::function<bool(const std::string&, double fraction)> progress;
@@ -112,8 +113,21 @@ struct MesoFactors {
     double wrongHits = 0;   ///< part whose hit, told by half a point before the boundary, is wrong
 };
 
+/// One view of a remeshed height field (bench_remesh.h).
+struct RemeshRow {
+    std::string asset, view, filter;
+    double cell = 1;                   ///< pixels
+    double p50 = 0, p95 = 0, max = 0;  ///< of the error, pixels
+    double boundPixels = 0;            ///< what the error is certified to be within
+    double bias = 0;                   ///< mean height above the surface's, half quad edges
+    double horizonLoss = 0;            ///< pixels that the horizon is lower, mean
+    uint64_t vertices = 0, triangles = 0, bytes = 0;
+    double ms = 0;  ///< of one frame's remeshing, one thread, median
+};
+
 struct BenchMesoReport {
     std::vector<BenchMesoRow> rows;
+    std::vector<RemeshRow> remeshed;
     std::vector<MesoCheck> checks;
     std::vector<MesoPublished> published;
     std::vector<MesoFactors> factors;

@@ -207,11 +207,24 @@ std::string benchMesoJson(const BenchMesoReport& report) {
                            {"rms_points", f.rmsPoints},
                            {"off_by_a_point", f.offByPoint},
                            {"wrong_hits", f.wrongHits}});
-    return Json{{"rows", rowsOf(report)},
-                {"headline", headlines},
-                {"checks", checks},
-                {"published", published},
-                {"factors", factors}}
+    Json remeshed = Json::array();
+    for (const RemeshRow& row : report.remeshed)
+        remeshed.push_back({{"asset", row.asset},
+                            {"view", row.view},
+                            {"filter", row.filter},
+                            {"cell_pixels", row.cell},
+                            {"error_p50_pixels", row.p50},
+                            {"error_p95_pixels", row.p95},
+                            {"error_max_pixels", row.max},
+                            {"bound_pixels", row.boundPixels},
+                            {"bias", row.bias},
+                            {"horizon_loss_pixels", row.horizonLoss},
+                            {"vertices", row.vertices},
+                            {"triangles", row.triangles},
+                            {"bytes", row.bytes},
+                            {"ms", row.ms}});
+    return Json{{"rows", rowsOf(report)}, {"headline", headlines}, {"checks", checks},
+                {"published", published}, {"factors", factors},    {"remeshed", remeshed}}
         .dump();
 }
 
@@ -259,6 +272,17 @@ std::string benchMesoMarkdown(const BenchMesoReport& report) {
         for (const MesoFactors& f : report.factors)
             text += fmt::format("| {} | {} | {} | {} | {:.3f} | {:.3f} | {:.1f} | {:.1f} |\n", f.asset, f.form, f.rank,
                                 f.clusters, double(f.bytes) * 1e-6, f.rmsPoints, 100 * f.offByPoint, 100 * f.wrongHits);
+    }
+    if (!report.remeshed.empty()) {
+        text +=
+            "\n| remeshed | view | filter | cell px | error p50 | p95 | max px | certified px | bias | horizon lower "
+            "by px "
+            "| vertices | ms |\n|---|---|---|---|---|---|---|---|---|---|---|---|\n";
+        for (const RemeshRow& row : report.remeshed)
+            text += fmt::format(
+                "| {} | {} | {} | {:g} | {:.3f} | {:.3f} | {:.2f} | {:.2f} | {:+.5f} | {:+.2f} | {} | {:.1f} |\n",
+                row.asset, row.view, row.filter, row.cell, row.p50, row.p95, row.max, row.boundPixels, row.bias,
+                row.horizonLoss, row.vertices, row.ms);
     }
     if (report.checks.empty()) return text;
     text += "\n| asset | map | rays | oversteps | worst, texels |\n|---|---|---|---|---|\n";

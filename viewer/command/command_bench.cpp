@@ -413,6 +413,8 @@ RunCommand addBenchMeso(CLI::App& bench) {
                   "Also compare factors of displacement maps, published and clustered, with the distances");
     app->add_flag("--published", options.published,
                   "Beside the ratios of the paper's tables (with --sweep, for those of times)");
+    app->add_flag("--remesh", options.remesh,
+                  "Remeshing of the height fields as well: error in pixels, vertices and time, by cell and filter");
     app->add_option("--device", command->device,
                     "March on a Vulkan device: an index or a part of a name, or without one the best [on the CPU]")
         ->type_name("DEVICE")

@@ -6,7 +6,6 @@
 #include <glm/geometric.hpp>
 
 #include "mesostructure/base/subdivision.h"
-#include "mesostructure/method.h"
 #include "render/false_colours.h"
 #include "render/host_renderer.h"
 #include "viewer/annotation/picture_canvas.h"
@@ -19,6 +18,7 @@
 #include "viewer/command/render_outputs.h"
 #include "viewer/command/terminal/interrupt.h"
 #include "viewer/picture/image_files.h"
+#include "viewer/scene/meso_scene.h"
 #include "viewer/scene/option_values.h"
 #include "viewer/scene/scene_opening.h"
 #include "viewer/window/measurement.h"
@@ -341,10 +341,10 @@ Command addRender(CLI::App& vcp) {
     beginGroup(*app, help_group::kMeasuring);
     app->add_option("--methods", command->methods,
                     fmt::format("Mesostructure by these methods in place of the scene's, side by side: {}",
-                                fmt::join(meso::methodNames(), ", ")))
+                                fmt::join(surfaceMethodNames(), ", ")))
         ->type_name("A,B")
         ->delimiter(',')
-        ->check(CLI::IsMember(std::vector<std::string>(meso::methodNames().begin(), meso::methodNames().end())))
+        ->check(CLI::IsMember(std::vector<std::string>(surfaceMethodNames().begin(), surfaceMethodNames().end())))
         ->allow_extra_args(false);
     app->add_flag("--validation", command->validation, "With Vulkan's validation layers: what they say is an error");
     addBuildSettings(*app, command->build, help_group::kMeshes);

@@ -8,6 +8,7 @@
 
 #include "mesostructure/base/subdivision.h"
 #include "mesostructure/base/surface_edges.h"
+#include "mesostructure/remesh/remesher.h"
 #include "mesostructure/solids.h"
 #include "viewer/scene/base_mesh.h"
 #include "viewer/scene/tile_texture.h"
@@ -73,6 +74,37 @@ private:
     Known colours_, normals_;
 };
 
+/// Makes remeshed surfaces; the levels of a height field are made once.
+class Remeshing {
+public:
+    Result<MesoSurface> make(const MesoSurfaceDescription& d, const Asset& asset, const BaseSurface& base) {
+        if (!asset.heights)
+            return Error{.code = ErrorCode::Usage,
+                         .message = fmt::format("{} is for height fields; {} is a solid", kRemeshMethod, asset.name)};
+        if (!d.normalTexture.empty())
+            return Error{.code = ErrorCode::Usage,
+                         .message = fmt::format("{} takes no normal texture: leave it out, or take another method",
+                                                kRemeshMethod)};
+        auto& levels = levels_[d.asset];
+        if (!levels) {
+            VCP_TRY_ASSIGN(auto made, HeightLevels::build(*asset.heights));
+            levels = std::make_shared<const HeightLevels>(std::move(made));
+        }
+        auto made = buildRemeshSurface(base, levels, d.heightScale * tileEdge(base) * asset.extent.z);
+        if (!made) {
+            Error error = made.error();
+            if (isFile(d)) error.file = d.base;
+            return error;
+        }
+        MesoSurface surface;
+        surface.remeshed = {std::make_shared<const RemeshSurface>(*std::move(made)), {.cell = d.cell}};
+        return surface;
+    }
+
+private:
+    std::map<std::string, std::shared_ptr<const HeightLevels>> levels_;
+};
+
 void warn(const MesoSurfaceDescription& d, const BaseSurface& base, const Shell& shell,
           std::vector<std::string>& warnings) {
     if (const auto edges = isFile(d) ? edgesOf(base) : SurfaceEdges(); !edges) {
@@ -121,15 +153,35 @@ Result<Asset> openMesoAsset(const std::string& name) {
     return asset;
 }
 
+std::span<const std::string_view> surfaceMethodNames() {
+    static const std::vector<std::string_view> names = [] {
+        std::vector<std::string_view> all(methodNames().begin(), methodNames().end());
+        all.push_back(kRemeshMethod);
+        return all;
+    }();
+    return names;
+}
+
 Result<MesoScene> makeMesoScene(std::span<const MesoSurfaceDescription> descriptions) {
     MesoScene scene;
     Textures textures;
+    Remeshing remeshing;
     std::map<std::pair<std::string, double>, std::shared_ptr<const Appearance>> appearances;
     for (const MesoSurfaceDescription& d : descriptions) {
         const auto asset = openMesoAsset(d.asset);
         if (!asset) return d.from.blamed(asset.error());
         const auto base = baseOf(d);
         if (!base) return d.from.blamed(base.error());
+        if (d.method.name == kRemeshMethod) {
+            auto surface = remeshing.make(d, *asset, *base);
+            if (!surface) return d.from.blamed(surface.error());
+            VCP_TRY_ASSIGN(surface->colours, textures.colours(d.colourTexture));
+            surface->colour = d.colour;
+            const RemeshSurface& made = *surface->remeshed.surface;
+            scene.bounds = scene.bounds.joined({made.low, made.high});
+            scene.surfaces.push_back(*std::move(surface));
+            continue;
+        }
         auto arrays = arraysOf(*asset, d.method);
         if (!arrays) {
             Error error = arrays.error();

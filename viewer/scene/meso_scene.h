@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "mesostructure/method.h"
@@ -27,17 +28,25 @@ struct ScenePlace {
     [[nodiscard]] Error blamed(Error error) const;
 };
 
+/// The method that draws displaced surfaces as triangles, remeshed for each view (mesostructure/remesh/remesher.h). It
+/// is for height fields only.
+inline constexpr std::string_view kRemeshMethod = "remesh";
+
+/// What a surface may be drawn by: the methods that march, and kRemeshMethod.
+std::span<const std::string_view> surfaceMethodNames();
+
 struct MesoSurfaceDescription {
-    std::string asset;  ///< as openMesoAsset
-    meso::MethodOptions method;
-    std::string base = "quad";  ///< a name of baseSurfaceNames(), or a mesh file with texture coordinates
-    double tiles = 4;           ///< tile edges along the base (makeBaseSurface, readBaseMesh)
-    int subdivide = 0;          ///< times that Loop's rules are applied to the base (meso::subdivided)
-    double heightScale = 1;     ///< height of the slab; 1: in the asset's own proportion to its tile's edge
-    glm::dvec3 place{0};        ///< the base's origin, world
-    double scale = 1;           ///< scale of the base, of mesh files too
-    UpAxis up = UpAxis::Z;      ///< which way the base's z points; mesh files stay as they are
-    glm::vec3 colour{0.8f};     ///< encoded
+    std::string asset;           ///< as openMesoAsset
+    meso::MethodOptions method;  ///< its name may be kRemeshMethod
+    double cell = 1;             ///< pixels of a cell of kRemeshMethod
+    std::string base = "quad";   ///< a name of baseSurfaceNames(), or a mesh file with texture coordinates
+    double tiles = 4;            ///< tile edges along the base (makeBaseSurface, readBaseMesh)
+    int subdivide = 0;           ///< times that Loop's rules are applied to the base (meso::subdivided)
+    double heightScale = 1;      ///< height of the slab; 1: in the asset's own proportion to its tile's edge
+    glm::dvec3 place{0};         ///< the base's origin, world
+    double scale = 1;            ///< scale of the base, of mesh files too
+    UpAxis up = UpAxis::Z;       ///< which way the base's z points; mesh files stay as they are
+    glm::vec3 colour{0.8f};      ///< encoded
     std::string colourTexture, normalTexture;  ///< pictures over the tile (viewer/scene/tile_texture.h); empty: none
     bool withBase = true;
     bool withFar = true;  ///< far away it is not marched (MesoLook::errorPixels)

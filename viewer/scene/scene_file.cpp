@@ -27,7 +27,8 @@ using Json = nlohmann::json;
 constexpr size_t kLargestFile = 1 << 20;
 constexpr size_t kMostSurfaces = 64;
 constexpr int kDeepest = 16;
-constexpr int kMostSteps = 4096;  // of relief mapping
+constexpr int kMostSteps = 4096;                             // of relief mapping
+constexpr double kSmallestCell = 0.25, kLargestCell = 1000;  // pixels, of remeshing
 // Within this range double precision resolves a millimetre where units are metres, and more.
 constexpr double kLargestNumber = 1e12, kLargestScale = 1e9;
 
@@ -187,9 +188,9 @@ private:
         MesoSurfaceDescription made;
         made.method.name = "boxes";
         if (!isObject(json, at)) return made;
-        onlyKeys(json, at,
-                 {"asset", "surface", "subdivide", "tiles", "height", "translate", "scale", "up", "colour", "texture",
-                  "normal_texture", "method", "grid", "cones", "steps", "rank", "directions", "base", "far"});
+        onlyKeys(json, at, {"asset", "surface", "subdivide", "tiles",          "height", "translate", "scale",
+                            "up",    "colour",  "texture",   "normal_texture", "method", "cell",      "grid",
+                            "cones", "steps",   "rank",      "directions",     "base",   "far"});
         if (!json.contains("asset"))
             wrong(at, "\"asset\" is missing");
         else
@@ -211,6 +212,7 @@ private:
         if (json.contains("normal_texture"))
             made.normalTexture = named(json["normal_texture"], at + "/normal_texture", isPicture);
         if (json.contains("method")) made.method.name = methodNamed(json["method"], at + "/method");
+        if (json.contains("cell")) made.cell = pixels(json["cell"], at + "/cell");
         if (json.contains("grid")) made.method.cells = whole(json["grid"], at + "/grid", meso::kMaxGridEdge);
         if (json.contains("cones")) made.method.cones = cones(json["cones"], at + "/cones");
         if (json.contains("steps")) made.method.steps = whole(json["steps"], at + "/steps", kMostSteps);
@@ -265,8 +267,15 @@ private:
         return rgb;
     }
 
+    double pixels(const Json& json, const std::string& at) {
+        const double edge = json.is_number() ? json.get<double>() : 0;
+        if (!(edge >= kSmallestCell && edge <= kLargestCell))
+            return wrong(at, fmt::format("must be from {:g} to {:g} pixels", kSmallestCell, kLargestCell)), 1;
+        return edge;
+    }
+
     std::string methodNamed(const Json& json, const std::string& at) {
-        const auto names = meso::methodNames();
+        const auto names = surfaceMethodNames();
         const std::string name = json.is_string() ? json.get<std::string>() : std::string();
         if (std::ranges::find(names, name) == names.end())
             wrong(at, fmt::format("must be one of {}", fmt::join(names, ", ")));

@@ -45,6 +45,7 @@ Json surfaceJson(const MesoSurfaceDescription& surface) {
     put("texture", surface.colourTexture, usual.colourTexture);
     put("normal_texture", surface.normalTexture, usual.normalTexture);
     json["method"] = surface.method.name;
+    put("cell", surface.cell, usual.cell);
     put("grid", surface.method.cells, usual.method.cells);
     const meso::Cones cones = surface.method.cones, usualCones = usual.method.cones;
     if (cones.azimuth != usualCones.azimuth || cones.elevation != usualCones.elevation)

@@ -267,6 +267,8 @@ TEST(Remesher, VerticesLieOnTheMapsSurface) {
                         vertex.position.z * camera.forward;
         ASSERT_NEAR(0.5 * (p.x + 1), vertex.uv.x, 1e-5);
         ASSERT_LT(std::abs(shape->field({vertex.uv.x, vertex.uv.y, 0.5 * p.z})), 1e-5);
+        const dvec3 n = vertex.normal.x * camera.right + vertex.normal.y * camera.up + vertex.normal.z * camera.forward;
+        ASSERT_GT(n.z, 0);
     }
 }
 

@@ -239,6 +239,39 @@ TEST(SceneFile, WhatItNamesIsBlamedOnIt) {
     EXPECT_EQ(ScenePlace().blamed({ErrorCode::Usage, "no such name"}).code, ErrorCode::Usage);
 }
 
+TEST(SceneFile, SurfacesMayBeRemeshed) {
+    const auto sceneOf = [](const std::string& more) {
+        return sceneFromJson(R"({"mesostructure": [{"asset": "ridged", "method": "remesh")" + more + "}]}", "m.json",
+                             {});
+    };
+    const auto scene = sceneOf(R"(, "cell": 5)");
+    ASSERT_TRUE(scene) << scene.error().line();
+    EXPECT_EQ(scene->surfaces[0].method.name, kRemeshMethod);
+    EXPECT_EQ(scene->surfaces[0].cell, 5);
+    EXPECT_EQ(sceneFromJson(sceneToJson(*scene), "m.json", {})->surfaces[0].cell, 5);
+    for (const char* cell : {"0", "-1", "1001", "\"2\"", "null"})
+        EXPECT_EQ(sceneOf(std::string(", \"cell\": ") + cell).error().line(),
+                  "m.json: line 1: \"cell\": must be from 0.25 to 1000 pixels")
+            << cell;
+    const auto made = makeMesoScene(scene->surfaces);
+    ASSERT_TRUE(made) << made.error().line();
+    EXPECT_TRUE(made->surfaces[0].remeshed.surface);
+    EXPECT_EQ(made->surfaces[0].remeshed.options.cell, 5);
+    EXPECT_NEAR(made->bounds.high.x, 1, 1e-9);
+    EXPECT_GT(made->bounds.high.z, 0.01);
+}
+
+TEST(SceneFile, WhatCannotBeRemeshedIsSaid) {
+    const auto errorOf = [](const std::string& surface) {
+        const auto scene = sceneFromJson(R"({"mesostructure": [{"method": "remesh", )" + surface + "}]}", "m.json", {});
+        EXPECT_TRUE(scene);
+        return scene ? makeMesoScene(scene->surfaces).error().line() : scene.error().line();
+    };
+    EXPECT_NE(errorOf(R"("asset": "bead")").find("remesh is for height fields; bead is a solid"), std::string::npos);
+    EXPECT_NE(errorOf(R"("asset": "fbm", "normal_texture": "n.png")").find("remesh takes no normal texture"),
+              std::string::npos);
+}
+
 // Whatever is cut off or in the wrong place is an error or a scene, nothing else.
 TEST(SceneFile, EveryPrefixAndFlippedByteIsAnAnswer) {
     const std::string document = contentOf(std::string(VCP_SOURCE_DIR) + "/docs/scenes.md");

@@ -1,0 +1,147 @@
+#include "render/passes/remesh_raster.h"
+
+#include <algorithm>
+#include <cstddef>
+#include <cstring>
+
+#include <fmt/format.h>
+#include <glm/geometric.hpp>
+#include <glm/vec4.hpp>
+
+#include "render/remesh_frag_spirv.h"
+#include "render/remesh_vert_spirv.h"
+
+namespace vcp {
+
+namespace {
+
+using Vertex = meso::RemeshVertex<float>;
+static_assert(sizeof(Vertex) == 32);
+
+constexpr std::array<VkFormat, 2> kColours{VK_FORMAT_R32G32B32A32_SFLOAT, VK_FORMAT_R32G32B32A32_SFLOAT};
+// Nearer than this part of a surface's size to the eye nothing is drawn.
+constexpr double kNearestPart = 1e-5;
+
+/// As remesh_view.glsl has it.
+struct PushedView {
+    glm::vec4 plane, depth, axes[3];
+};
+
+double sizeOf(const meso::RemeshSurface& surface) { return glm::length(surface.high - surface.low); }
+
+double nearestOf(const meso::RemeshSurface& surface) { return kNearestPart * sizeOf(surface); }
+
+meso::RemeshCamera cameraOf(const meso::RemeshSurface& surface, const RemeshLook& look) {
+    const PictureTile& tile = look.tile;
+    const CameraBasis basis = cameraBasis(look.camera, tile.fullWidth, tile.fullHeight);
+    meso::RemeshCamera camera;
+    camera.eye = look.camera.eye;
+    camera.right = basis.right, camera.up = basis.up, camera.forward = basis.forward;
+    camera.focal = tile.fullHeight / (2 * basis.halfHeight);
+    camera.isParallel = look.camera.projection == Projection::Orthographic;
+    const double stepX = 2 * basis.halfWidth / tile.fullWidth, stepY = 2 * basis.halfHeight / tile.fullHeight;
+    // A pixel more on each side holds what rounding moves.
+    const double left = look.upperLeft.x - 1, top = look.upperLeft.y - 1;
+    camera.seen = {left * stepX - basis.halfWidth, basis.halfHeight - (top + look.size.height + 2) * stepY,
+                   (left + look.size.width + 2) * stepX - basis.halfWidth, basis.halfHeight - top * stepY};
+    camera.nearest = nearestOf(surface);
+    return camera;
+}
+
+Error tooMany(uint64_t pixels, uint64_t most) {
+    return {.code = ErrorCode::Limit,
+            .message = fmt::format("{} pixels of a remeshed surface; this device reads {} at most", pixels, most)};
+}
+
+}  // namespace
+
+Result<void> RemeshRaster::prepare(RemeshTarget& target, PictureSize size, size_t surfaces) {
+    if (!pipeline_.exists()) {
+        VCP_TRY_ASSIGN(pipeline_, RasterPipeline::create(
+                                      device_, {.vertex = kRemeshVertSpirv,
+                                                .fragment = kRemeshFragSpirv,
+                                                .vertexBytes = sizeof(Vertex),
+                                                .attributes = {{VK_FORMAT_R32G32B32_SFLOAT, offsetof(Vertex, position)},
+                                                               {VK_FORMAT_R32G32B32_SFLOAT, offsetof(Vertex, normal)},
+                                                               {VK_FORMAT_R32G32_SFLOAT, offsetof(Vertex, uv)}},
+                                                .pushBytes = sizeof(PushedView),
+                                                .colours = {kColours.begin(), kColours.end()}}));
+    }
+    target.meshes.resize(surfaces);
+    const VkExtent2D extent{size.width, size.height};
+    if (target.images.size().width == extent.width && target.images.size().height == extent.height) return {};
+    if (size.pixels() > device_.limits().maxTexelBufferElements)
+        return tooMany(size.pixels(), device_.limits().maxTexelBufferElements);
+    target.images = {};
+    for (MesoTexels& copy : target.copies) {
+        const uint64_t bytes = size.pixels() * sizeof(glm::vec4);
+        VCP_TRY_ASSIGN(
+            copy.buffer,
+            device_.createBuffer(bytes, VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT,
+                                 MemoryUse::Local));
+        VCP_TRY_ASSIGN(copy.view, device_.createTexelView(copy.buffer, kColours[0], bytes));
+        VCP_TRY_ASSIGN(copy.quads, device_.createTexelView(copy.buffer, VK_FORMAT_R32G32B32A32_UINT, bytes));
+    }
+    VCP_TRY_ASSIGN(target.images, RasterTarget::create(device_, pipeline_, kColours, extent));
+    return {};
+}
+
+Result<void> RemeshRaster::upload(Buffer& buffer, std::span<const std::byte> bytes, VkBufferUsageFlags use) const {
+    // It grows by halves, so that a camera's way makes few buffers.
+    if (bytes.size() > buffer.bytes()) {
+        VCP_TRY_ASSIGN(buffer, device_.createBuffer(bytes.size() + bytes.size() / 2, use, MemoryUse::Upload));
+    }
+    if (!bytes.empty()) std::memcpy(buffer.mapped(), bytes.data(), bytes.size());
+    return {};
+}
+
+Result<void> RemeshRaster::remesh(RemeshTarget& target, size_t number, const RemeshedSurface& surface,
+                                  const RemeshLook& look) {
+    RemeshBuffers& buffers = target.meshes[number];
+    target.mesh.clear();
+    buffers.indexCount = 0;
+    VCP_TRY(meso::remesh(*surface.surface, cameraOf(*surface.surface, look), surface.options, target.mesh));
+    VCP_TRY(
+        upload(buffers.vertices, std::as_bytes(std::span(target.mesh.vertices)), VK_BUFFER_USAGE_VERTEX_BUFFER_BIT));
+    VCP_TRY(upload(buffers.indices, std::as_bytes(std::span(target.mesh.indices)), VK_BUFFER_USAGE_INDEX_BUFFER_BIT));
+    buffers.indexCount = uint32_t(target.mesh.indices.size());
+    return {};
+}
+
+void RemeshRaster::record(VkCommandBuffer commands, const RemeshTarget& target, size_t number,
+                          const RemeshedSurface& surface, const RemeshLook& look) const {
+    const PictureTile& tile = look.tile;
+    const CameraBasis basis = cameraBasis(look.camera, tile.fullWidth, tile.fullHeight);
+    const double width = look.size.width, height = look.size.height;
+    // Pixels from the left are (x / halfWidth + 1) * fullWidth / 2 - upperLeft.x; from above, with y turned.
+    PushedView projection{};
+    projection.plane = {tile.fullWidth / basis.halfWidth / width, -(tile.fullHeight / basis.halfHeight / height),
+                        (tile.fullWidth - 2 * look.upperLeft.x) / width - 1,
+                        (tile.fullHeight - 2 * look.upperLeft.y) / height - 1};
+    const meso::RemeshSurface& drawn = *surface.surface;
+    if (look.camera.projection == Projection::Orthographic) {
+        const double far = glm::distance(0.5 * (drawn.low + drawn.high), look.camera.eye) + sizeOf(drawn);
+        projection.depth = {-1 / far, 1, 0, 1};
+    } else {
+        projection.depth = {0, nearestOf(drawn), 1, 0};
+    }
+    const glm::dvec3 axes[3] = {basis.right, basis.up, basis.forward};
+    for (int i = 0; i < 3; ++i) projection.axes[i] = glm::vec4(axes[i], 0);
+    const RemeshBuffers& mesh = target.meshes[number];
+    barrierToAll(commands);
+    pipeline_.begin(commands, target.images.framebuffer(), target.images.size());
+    if (mesh.indexCount > 0) {
+        vkCmdPushConstants(commands, pipeline_.layout(), VK_SHADER_STAGE_VERTEX_BIT | VK_SHADER_STAGE_FRAGMENT_BIT, 0,
+                           sizeof projection, &projection);
+        const VkBuffer vertices = mesh.vertices.handle();
+        const VkDeviceSize start = 0;
+        vkCmdBindVertexBuffers(commands, 0, 1, &vertices, &start);
+        vkCmdBindIndexBuffer(commands, mesh.indices.handle(), 0, VK_INDEX_TYPE_UINT32);
+        vkCmdDrawIndexed(commands, mesh.indexCount, 1, 0, 0, 0);
+    }
+    vkCmdEndRenderPass(commands);
+    for (size_t i = 0; i < target.copies.size(); ++i) target.images.copy(commands, i, target.copies[i].buffer);
+    barrierToAll(commands);
+}
+
+}  // namespace vcp

@@ -1,0 +1,170 @@
+// Remeshed surfaces in pictures: where they are, what is nearer, tiles, and beside marched ones.
+#include <algorithm>
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "mesostructure/method.h"
+#include "mesostructure/solids.h"
+#include "render/passes/meso_surface.h"
+#include "tests/support/renderer_fixture.h"
+
+namespace vcp {
+namespace {
+
+using namespace meso;
+
+constexpr uint32_t kEdge = 96;
+
+class RemeshedSurfaces : public vcp::test::RendererFixture {
+protected:
+    void SetUp() override { start(); }
+
+    static MesoSurface surfaceOf(const HeightMap& map, std::string_view base, double height, double cell = 1,
+                                 glm::dvec3 place = glm::dvec3(0)) {
+        BaseSurface surface = *makeBaseSurface(base, 2);
+        for (glm::dvec3& p : surface.positions) p += place;
+        auto levels = std::make_shared<const HeightLevels>(*HeightLevels::build(map));
+        MesoSurface made;
+        made.remeshed = {std::make_shared<const RemeshSurface>(*buildRemeshSurface(surface, levels, height)),
+                         {.cell = cell}};
+        return made;
+    }
+    static MesoSurface marchedOf(const Asset& asset, std::string_view base, double height) {
+        const auto shape = shapeOf(asset);
+        const auto method = buildMethod(asset, **shape, {.name = "pyramid"});
+        MesoSurface made;
+        made.arrays = std::make_shared<const MarchArrays>(*method->arrays());
+        made.shell = *buildShell(*makeBaseSurface(base, 2), height, asset.extent);
+        return made;
+    }
+    static HeightMap plateau() { return {{8, 8}, 0.25, std::vector<uint16_t>(64, 39321)}; }
+    static FrameRequest lookFrom(glm::dvec3 eye, bool isOrthographic = false) {
+        FrameRequest request;
+        request.width = request.height = kEdge;
+        request.camera = {.eye = eye, .forward = glm::normalize(-eye), .up = {0, 1, 0.3}};
+        if (isOrthographic) request.camera.projection = Projection::Orthographic, request.camera.orthographicHeight = 3;
+        return request;
+    }
+    std::vector<float> depthsOf(const std::vector<MesoSurface>& surfaces, const FrameRequest& request) {
+        EXPECT_TRUE(renderer_->setSurfaces(surfaces).ok());
+        RendererFixture::draw(request);
+        return *renderer_->readDepth();
+    }
+};
+
+TEST_F(RemeshedSurfaces, PlateauOnAQuadIsAPlane) {
+    for (const bool isOrthographic : {true, false}) {
+        SCOPED_TRACE(isOrthographic);
+        const FrameRequest request = lookFrom({0, 0, 5}, isOrthographic);
+        const auto depths = depthsOf({surfaceOf(plateau(), "quad", 0.5)}, request);
+        const auto normals = *renderer_->readNormals();
+        uint32_t hits = 0;
+        for (uint32_t y = 0; y < kEdge; ++y)
+            for (uint32_t x = 0; x < kEdge; ++x) {
+                const CameraRay ray = cameraRay(request.camera, kEdge, kEdge, x + 0.5, y + 0.5);
+                const double t = (0.3 - ray.origin.z) / ray.direction.z;
+                const glm::dvec3 p = ray.origin + t * ray.direction;
+                const float depth = depths[y * kEdge + x];
+                const double inside = 1 - std::max(std::abs(p.x), std::abs(p.y));
+                if (std::abs(inside) < 1e-3) continue;
+                ASSERT_EQ(std::isfinite(depth), inside > 0) << x << ", " << y;
+                if (!std::isfinite(depth)) continue;
+                ++hits;
+                ASSERT_NEAR(depth, t, 1e-4) << x << ", " << y;
+                ASSERT_GT(normals[y * kEdge + x].z, 0.99f) << x << ", " << y;
+            }
+        EXPECT_GT(hits, 500u);
+    }
+}
+
+/// Marched and remeshed surfaces are the same surface; what is nearer is seen, whichever is drawn first.
+TEST_F(RemeshedSurfaces, LookLikeMarchedOnes) {
+    Asset asset;
+    asset.name = "fbm";
+    asset.heights = *makeHeightField("fbm", 64, 1);
+    asset.extent = asset.heights->extent();
+    for (const auto base : {"sphere", "torus"}) {
+        SCOPED_TRACE(base);
+        const FrameRequest request = lookFrom({2.4, 1.8, 3});
+        const MesoSurface marched = marchedOf(asset, base, 0.15), remeshed = surfaceOf(*asset.heights, base, 0.15, 0.5);
+        const auto truth = depthsOf({marched}, request), depths = depthsOf({remeshed}, request);
+        double sum = 0;
+        uint32_t both = 0, one = 0;
+        for (size_t i = 0; i < depths.size(); ++i) {
+            one += std::isfinite(depths[i]) != std::isfinite(truth[i]);
+            if (!std::isfinite(depths[i]) || !std::isfinite(truth[i])) continue;
+            ++both, sum += std::abs(depths[i] - truth[i]);
+        }
+        EXPECT_GT(both, 1000u);
+        EXPECT_LT(one, both / 50);
+        EXPECT_LT(sum / both, 0.01);
+        const auto either = depthsOf({marched, remeshed}, request), other = depthsOf({remeshed, marched}, request);
+        for (size_t i = 0; i < depths.size(); ++i) {
+            ASSERT_EQ(either[i], std::min(depths[i], truth[i])) << i;
+            ASSERT_EQ(other[i], std::min(depths[i], truth[i])) << i;
+        }
+    }
+}
+
+TEST_F(RemeshedSurfaces, ASphereHasNoHoles) {
+    const double radius = 1 + 0.6 * 0.2;
+    const FrameRequest request = lookFrom({1.5, 2, 2.5});
+    for (const double cell : {1.0, 5.0, 20.0}) {
+        const auto depths = depthsOf({surfaceOf(plateau(), "sphere", 0.2, cell)}, request);
+        for (uint32_t y = 0; y < kEdge; ++y)
+            for (uint32_t x = 0; x < kEdge; ++x) {
+                const CameraRay ray = cameraRay(request.camera, kEdge, kEdge, x + 0.5, y + 0.5);
+                const double along = -glm::dot(ray.origin, ray.direction),
+                             off = glm::length(ray.origin + along * ray.direction);
+                const bool isHit = std::isfinite(depths[y * kEdge + x]);
+                ASSERT_FALSE(off < 0.97 * radius && !isHit) << x << ", " << y;
+                ASSERT_FALSE(off > 1.01 * radius && isHit) << x << ", " << y;
+            }
+    }
+}
+
+/// A picture in tiles is the picture: the grid is the whole picture's.
+TEST_F(RemeshedSurfaces, TilesAreTheWholePictures) {
+    const HeightMap map = *makeHeightField("ridged", 64, 1);
+    const MesoSurface surface = surfaceOf(map, "torus", 0.2, 4);
+    FrameRequest request = lookFrom({2.4, 1.8, 3});
+    const auto whole = depthsOf({surface}, request);
+    const Picture picture = *renderer_->readPicture();
+    uint32_t differs = 0;
+    for (uint32_t ty = 0; ty < 2; ++ty)
+        for (uint32_t tx = 0; tx < 3; ++tx) {
+            FrameRequest tile = request;
+            tile.width = kEdge / 3, tile.height = kEdge / 2;
+            tile.tile = PictureTile{tx * tile.width, ty * tile.height, kEdge, kEdge};
+            RendererFixture::draw(tile);
+            const auto depths = *renderer_->readDepth();
+            for (uint32_t y = 0; y < tile.height; ++y)
+                for (uint32_t x = 0; x < tile.width; ++x) {
+                    const float a = depths[y * tile.width + x],
+                                b = whole[(ty * tile.height + y) * kEdge + tx * tile.width + x];
+                    differs += std::isfinite(a) != std::isfinite(b) || (std::isfinite(a) && std::abs(a - b) > 1e-3f);
+                }
+        }
+    // Viewports of other sizes round vertices elsewhere within a pixel.
+    EXPECT_LT(differs, kEdge * kEdge / 500);
+    EXPECT_EQ(picture.width, kEdge);
+}
+
+TEST_F(RemeshedSurfaces, PicksAndColours) {
+    MesoSurface surface = surfaceOf(plateau(), "quad", 0.5);
+    surface.colour = {1, 0, 0};
+    FrameRequest request = lookFrom({0, 0, 5});
+    request.shading.mode = ShadingMode::Unlit;
+    depthsOf({surface}, request);
+    const auto hit = renderer_->pick(kEdge / 2, kEdge / 2);
+    ASSERT_TRUE(hit && *hit);
+    EXPECT_NEAR((*hit)->position.z, 0.3, 1e-4);
+    const Picture picture = *renderer_->readPicture();
+    const size_t middle = 4 * (size_t{kEdge} / 2 * kEdge + kEdge / 2);
+    EXPECT_EQ(picture.rgba[middle], 255);
+    EXPECT_EQ(picture.rgba[middle + 1], 0);
+}
+
+}  // namespace
+}  // namespace vcp
