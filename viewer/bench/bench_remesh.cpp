@@ -10,6 +10,7 @@
 #include <glm/geometric.hpp>
 
 #include "mesostructure/remesh/remesher.h"
+#include "mesostructure/solids.h"
 #include "viewer/scene/meso_scene.h"
 
 namespace vcp {
