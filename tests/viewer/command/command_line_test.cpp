@@ -748,8 +748,11 @@ TEST_F(CommandLine, PicturesInTilesAndSequences) {
         return run(arguments);
     };
     const auto picture = [&](const char* name) { return readPng(*folder_ / name).value(); };
-    ASSERT_EQ(render("tiled.png", {"--tile", "32"}).status, 0);
-    const Ran turned = render("turn.png", {"--tile", "32", "--turntable", "3", "--json"});
+    // Without a camera of its own a turntable stands where it sees all of the scan from every side.
+    const fs::path camera = *folder_ / "camera.json";
+    write(camera, R"({"position":[0,0,4],"target":[0,0,0]})");
+    ASSERT_EQ(render("tiled.png", {"--tile", "32", "--camera", camera.string()}).status, 0);
+    const Ran turned = render("turn.png", {"--tile", "32", "--turntable", "3", "--json", "--camera", camera.string()});
     ASSERT_EQ(turned.status, 0) << turned.err;
     EXPECT_EQ(Json::parse(turned.out)["pictures"], 3);
     EXPECT_EQ(Json::parse(turned.out)["tiles"], 18);
