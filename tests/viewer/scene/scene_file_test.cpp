@@ -24,10 +24,11 @@ TEST(SceneFile, TheDocumentsExampleIsRead) {
     const Similarity& turned = scene->datasets[1].placement;
     EXPECT_LT(glm::distance(turned.toWorld({0, 0, 1}), glm::dvec3(0.8, 0, 0)), 1e-15);
     EXPECT_LT(glm::distance(scene->datasets[2].placement.toWorld({1, 2, 3}), glm::dvec3(1, 1.8, 3)), 1e-15);
-    ASSERT_EQ(scene->lights.size(), 1u);
+    ASSERT_EQ(scene->lights.size(), 2u);
     EXPECT_FALSE(scene->lights[0].followsCamera);
     EXPECT_NEAR(glm::length(scene->lights[0].direction), 1, 1e-6);
     EXPECT_EQ(scene->lights[0].strength, 1);
+    EXPECT_FLOAT_EQ(float(scene->lights[1].strength), 0.3f);
     ASSERT_TRUE(scene->camera);
     EXPECT_EQ(scene->camera->position, glm::dvec3(0, 0.2, 1.5));
     EXPECT_EQ(scene->sections, (std::vector<SectionPlane>{{{1, 0, 0}, 0.05}}));
@@ -251,7 +252,7 @@ TEST(SceneFile, SurfacesMayBeRemeshed) {
     EXPECT_EQ(sceneFromJson(sceneToJson(*scene), "m.json", {})->surfaces[0].cell, 5);
     for (const char* cell : {"0", "-1", "1001", "\"2\"", "null"})
         EXPECT_EQ(sceneOf(std::string(", \"cell\": ") + cell).error().line(),
-                  "m.json: line 1: \"cell\": must be from 0.25 to 1000 pixels")
+                  "m.json: line 1: \"cell\" must be from 0.25 to 1000 pixels")
             << cell;
     const auto made = makeMesoScene(scene->surfaces);
     ASSERT_TRUE(made) << made.error().line();
