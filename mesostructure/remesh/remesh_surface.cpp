@@ -92,7 +92,7 @@ void addPlaces(RemeshSurface& surface) {
         return a.second.x != b.second.x ? a.second.x < b.second.x : a.second.y < b.second.y;
     };
     std::ranges::sort(all, order);
-    all.erase(std::ranges::unique(all).begin(), all.end());
+    all.erase(std::unique(all.begin(), all.end()), all.end());
     surface.firstPlace.assign(surface.positions.size() + 1, 0);
     for (const auto& [position, uv] : all) {
         ++surface.firstPlace[position + 1];

@@ -41,8 +41,10 @@ struct RemeshEdge {
 
 INLINE RemeshEdge remeshEdge(ivec3 a, ivec3 b) {
     ivec3 d = abs(b - a);
-    int axis = d.x >= d.y && d.x >= d.z ? 0 : d.y >= d.z ? 1 : 2;
-    return RemeshEdge(axis, max(d[axis], 1));
+    RemeshEdge edge;
+    edge.axis = d.x >= d.y && d.x >= d.z ? 0 : d.y >= d.z ? 1 : 2;
+    edge.cells = max(d[edge.axis], 1);
+    return edge;
 }
 
 // Whether the third corner lies within the edge's range along its main direction (definition 2).
