@@ -153,15 +153,6 @@ Result<Asset> openMesoAsset(const std::string& name) {
     return asset;
 }
 
-std::span<const std::string_view> surfaceMethodNames() {
-    static const std::vector<std::string_view> names = [] {
-        std::vector<std::string_view> all(methodNames().begin(), methodNames().end());
-        all.push_back(kRemeshMethod);
-        return all;
-    }();
-    return names;
-}
-
 Result<MesoScene> makeMesoScene(std::span<const MesoSurfaceDescription> descriptions) {
     MesoScene scene;
     Textures textures;

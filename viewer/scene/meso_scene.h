@@ -33,7 +33,14 @@ struct ScenePlace {
 inline constexpr std::string_view kRemeshMethod = "remesh";
 
 /// What a surface may be drawn by: the methods that march, and kRemeshMethod.
-std::span<const std::string_view> surfaceMethodNames();
+inline std::span<const std::string_view> surfaceMethodNames() {
+    static const std::vector<std::string_view> names = [] {
+        std::vector<std::string_view> all(meso::methodNames().begin(), meso::methodNames().end());
+        all.push_back(kRemeshMethod);
+        return all;
+    }();
+    return names;
+}
 
 struct MesoSurfaceDescription {
     std::string asset;           ///< as openMesoAsset
