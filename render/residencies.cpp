@@ -31,6 +31,19 @@ void add(UpdateResult& all, const UpdateResult& one) {
     all.drawable = true;
 }
 
+/// Returns how many threads read for each dataset: as many as its source needs, or the same share of them where that is
+/// many, at least one; where `all` is not 0, their share of it.
+std::vector<uint32_t> loaderThreads(std::span<const PlacedDataset> placed, uint32_t all) {
+    constexpr double kMost = 16;
+    double needed = 0;
+    for (const PlacedDataset& one : placed) needed += std::max(one.loaderThreads, 1u);
+    const double share = all > 0 ? all / needed : std::min(kMost / needed, 1.0);
+    std::vector<uint32_t> threads;
+    for (const PlacedDataset& one : placed)
+        threads.push_back(uint32_t(std::max(share * std::max(one.loaderThreads, 1u), 1.0)));
+    return threads;
+}
+
 }  // namespace
 
 Result<void> checkBudget(uint64_t budgetBytes) {
@@ -50,7 +63,7 @@ Result<std::vector<PlacedResidency>> openResidencies(const PageMemorySource& mem
     all.hiddenToo = options.hiddenToo;
     all.loader.withColour = options.colour;
     all.loader.heldBytes = options.ramBytes;
-    all.loader.threads = options.loaderThreads;
+    all.loader.threads = loaderThreads(placed, options.loaderThreads);
     std::vector<SceneSource::Part> parts;
     for (PlacedDataset& one : placed) {
         const uint64_t needed = placed.size() > 1 && !one.dataset->pages.empty()
@@ -62,7 +75,6 @@ Result<std::vector<PlacedResidency>> openResidencies(const PageMemorySource& mem
                                                 "memory for pages on their way: allow more",
                                                 needed, options.ramBytes),
                          .file = one.source->name()};
-        if (options.loaderThreads == 0) all.loader.threads = std::max(all.loader.threads, one.loaderThreads);
         parts.push_back({std::move(one.dataset), std::move(one.source)});
     }
     VCP_TRY_ASSIGN(auto scene, SceneResidency::create(memory, all, std::move(parts)));

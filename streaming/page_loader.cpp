@@ -42,7 +42,8 @@ double steadySeconds() {
 }  // namespace
 
 PageLoader::PageLoader(std::shared_ptr<const PageSource> source, const LoaderOptions& options)
-    : source_(std::move(source)), options_(options), queue_(options.retry), working_(std::max(options.threads, 1u)) {
+    : source_(std::move(source)), options_(options), queue_(options.retry), idle_(options.threads) {
+    for (uint32_t& threads : idle_) working_ += threads = std::max(threads, 1u);
     shareMemory();
     for (uint32_t i = 0, threads = working_; i < threads; ++i) threads_.emplace_back([this] { work(); });
 }
@@ -112,7 +113,7 @@ LoaderStats PageLoader::stats() const {
 /// no pages means that one was handed over unread.
 std::optional<PageLoader::Run> PageLoader::beginRun(double now) {
     if (doneBytes_ >= mostDone_) return std::nullopt;
-    const auto wish = queue_.next(now);
+    const auto wish = queue_.next(now, [&](Request request) { return idle_[source_->partOf(request)] > 0; });
     if (!wish) return std::nullopt;
     const Request first = wish->request;
     const uint64_t bytes = source_->bytesToRead(first, options_.withColour);
@@ -138,6 +139,7 @@ std::optional<PageLoader::Run> PageLoader::beginRun(double now) {
         queue_.begin(page);
         stats_.heldBytes += more;
     } while (++run.count < most);
+    --idle_[source_->partOf(first)];
     shareMemory();
     return run;
 }
@@ -156,6 +158,7 @@ void PageLoader::handOver(Request request, Result<PageBytes> bytes) {
 }
 
 void PageLoader::finishRun(Run run, std::vector<Result<PageBytes>> pages) {
+    if (run.count > 0) ++idle_[source_->partOf(run.first)];
     for (uint32_t i = 0; i < run.count; ++i) {
         const Request page = run.first.after(i);
         stats_.heldBytes -= source_->bytesToRead(page, options_.withColour);
@@ -189,7 +192,7 @@ std::vector<Result<PageBytes>> PageLoader::read(Run run) const {
 }
 
 void PageLoader::work() {
-    giveWay(std::max(options_.threads, options_.allThreads));
+    giveWay(uint32_t(threads_.size()));
     std::unique_lock lock(mutex_);
     while (!stop_) {
         const double now = steadySeconds();
@@ -198,10 +201,10 @@ void PageLoader::work() {
             auto pages = read(*run);
             lock.lock();
             finishRun(*run, std::move(pages));
-            work_.notify_all();  // memory was given back
+            work_.notify_all();  // memory was given back, and a part has a thread more
         } else {
             // New wishes, collect(), or a page that may be tried again wake it.
-            const double wait = queue_.nextTry() - now;
+            const double wait = queue_.nextTry(now) - now;
             if (wait > 0 && std::isfinite(wait))
                 work_.wait_for(lock, std::chrono::duration<double>(wait));
             else

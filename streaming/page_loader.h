@@ -4,7 +4,8 @@
 // all earlier wishes except those that a thread has begun; so what no view wants any more is not read. A page
 // that fails is tried again after a while, and given up after a few attempts (request_queue.h); meanwhile the
 // threads read other pages. Pages that lie together and are about as urgent are read together where the source
-// says so.
+// says so. Each part of the source has so many threads and takes no more, so a part that is slow, or answers nothing at
+// all, keeps no other waiting.
 //
 // No read begins while as many bytes are done as the next collect() would take: a moving view changes its wishes before
 // more could be of use, and what was read would be wasted.
@@ -37,8 +38,7 @@ struct Loaded {
 
 struct LoaderOptions {
     bool withColour = true;
-    uint32_t threads = 2;
-    uint32_t allThreads = 0;  ///< threads of all loaders of the same picture, these included; 0: there are no others
+    std::vector<uint32_t> threads = {2};  ///< by part of the source (PageSource::partOf), at least one each
     uint64_t heldBytes =
         64ull << 20;  ///< most bytes of pages being read or not collected yet, and of those that the source keeps
     RetryPolicy retry;
@@ -95,6 +95,7 @@ private:
     mutable std::mutex mutex_;
     std::condition_variable work_, ready_;
     RequestQueue queue_;
+    std::vector<uint32_t> idle_;  // threads by part that read nothing
     std::vector<Loaded> done_;
     uint64_t doneBytes_ = 0, mostDone_ = UINT64_MAX;
     LoaderStats stats_;

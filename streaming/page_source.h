@@ -37,6 +37,8 @@ public:
     /// Allows the source to keep stored pages in memory, to be read again: from now on at most `bytes`, whatever is
     /// being read. Returns how many bytes are kept. Only the PageLoader that owns the memory calls it.
     virtual uint64_t keepWithin([[maybe_unused]] uint64_t bytes) const { return 0; }
+    /// The part of the source that holds it, of those that are read from independently: 0, 1, …
+    [[nodiscard]] virtual uint32_t partOf([[maybe_unused]] Request request) const { return 0; }
     /// Ends reads that are under way soon, with Cancelled, where they could take long. Later reads work.
     virtual void interrupt() const {}
     /// The name of the pages' file, for errors; empty where there is none, or several.

@@ -24,12 +24,6 @@ double RequestQueue::dueOf(Request request) const {
     return trial != trials_.end() ? trial->second.due : 0;
 }
 
-std::optional<Wish> RequestQueue::next(double now) const {
-    for (const Wish& wish : wishes_)
-        if (isIdle(wish.request) && dueOf(wish.request) <= now) return wish;
-    return std::nullopt;
-}
-
 bool RequestQueue::mayBegin(Request request, double leastPriority, double now) const {
     const auto wish = priorities_.find(request);
     return wish != priorities_.end() && wish->second >= leastPriority && isIdle(request) && dueOf(request) <= now;
@@ -54,10 +48,10 @@ bool RequestQueue::failed(Request request, ErrorCode code, double now) {
     return true;
 }
 
-double RequestQueue::nextTry() const {
+double RequestQueue::nextTry(double now) const {
     double first = std::numeric_limits<double>::infinity();
     for (const auto& [request, trial] : trials_)
-        if (isIdle(request) && priorities_.contains(request)) first = std::min(first, trial.due);
+        if (trial.due > now && isIdle(request) && priorities_.contains(request)) first = std::min(first, trial.due);
     return first;
 }
 

@@ -38,8 +38,16 @@ public:
     /// The wishes from now on. What is under way stays so.
     void replace(std::vector<Wish> wishes);
 
-    /// The most urgent wish that may begin at `now`.
-    [[nodiscard]] std::optional<Wish> next(double now) const;
+    /// The most urgent wish that may begin at `now`, of those that `mayRead(Request)` returns true for.
+    template <typename MayRead>
+    [[nodiscard]] std::optional<Wish> next(double now, MayRead mayRead) const {
+        for (const Wish& wish : wishes_)
+            if (isIdle(wish.request) && mayRead(wish.request) && dueOf(wish.request) <= now) return wish;
+        return std::nullopt;
+    }
+    [[nodiscard]] std::optional<Wish> next(double now) const {
+        return next(now, [](Request) { return true; });
+    }
     /// Whether this request may begin at `now`, wished for with at least this priority.
     [[nodiscard]] bool mayBegin(Request request, double leastPriority, double now) const;
     void begin(Request request) { underWay_.insert(request); }
@@ -51,8 +59,8 @@ public:
     /// It was neither read nor did it fail: Cancelled.
     void returned(Request request) { underWay_.erase(request); }
 
-    /// When a request that waits may be begun; infinity where none waits.
-    [[nodiscard]] double nextTry() const;
+    /// When the next request that still waits at `now` may be begun; infinity where none waits.
+    [[nodiscard]] double nextTry(double now) const;
     /// Requests wished for or under way.
     [[nodiscard]] size_t pending() const;
     /// Elements of all containers: bounded by the dataset's pages and blocks.

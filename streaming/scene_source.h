@@ -24,6 +24,7 @@ public:
     [[nodiscard]] uint64_t bytesToRead(Request request, bool withColour) const override;
     /// Sources keep what they have while there is room, and share evenly what is left.
     uint64_t keepWithin(uint64_t bytes) const override;
+    [[nodiscard]] uint32_t partOf(Request request) const override { return uint32_t(numbers_.datasetOf(request)); }
     void interrupt() const override;
     [[nodiscard]] PageOrigin originOf(Request request) const override;
 

@@ -240,9 +240,9 @@ TEST_F(RendererTest, AsManyThreadsReadAsTheSourceNeeds) {
     const Scene scene = test::sphereScene(3);
     FrameRequest request = requestOf(fitCamera(scene.boxMin, scene.boxMax, {0, 0, -1}, {0, 1, 0}, 0.6, 4.0 / 3));
     request.errorPixels = 0.001;
-    // As it says; shared with another; as the options say, whatever it says.
+    // As it says, beside another too; as the options say, whatever it says; its share of that.
     for (const auto& [datasets, asked, threads] :
-         {std::tuple(1u, 0u, 5u), std::tuple(2u, 0u, 2u), std::tuple(1u, 3u, 3u)}) {
+         {std::tuple(1u, 0u, 5u), std::tuple(2u, 0u, 5u), std::tuple(1u, 3u, 3u), std::tuple(2u, 4u, 2u)}) {
         RendererOptions options;
         options.loaderThreads = asked;
         start(options);

@@ -190,7 +190,7 @@ TEST(DirectoryParts, TheLoaderReadsBlocksTogetherAndTriesAgain) {
     scan.file->reads = 0;
     PageLoader loader(
         std::make_shared<FilePageSource>(scan.file, start),
-        {.threads = 1,
+        {.threads = {1},
          .retry = {.attempts = 3, .damagedAttempts = 3, .firstDelaySeconds = 0.001, .longestDelaySeconds = 0.001}});
     loader.request({{Request::directoryBlock(2), 1},
                     {Request::directoryBlock(3), 1},

@@ -26,7 +26,9 @@ public:
             std::unique_lock lock(mutex_);
             begun_.push_back(page);
             changed_.notify_all();
-            changed_.wait(lock, [&] { return !held_ && (page != stalling || interrupted_); });
+            changed_.wait(lock, [&] {
+                return !held_ && ((page != stalling && !(stallingOdd && page % 2 == 1)) || interrupted_);
+            });
         }
         niceness = ::getpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()));
         if (page == failing) return Error{.code = ErrorCode::Io, .message = "broken", .element = "page 13"};
@@ -66,6 +68,7 @@ public:
     mutable std::atomic<uint64_t> kept{0};
 
     mutable std::atomic<int> niceness{0};
+    bool stallingOdd = false;
     uint64_t failing = UINT64_MAX, stalling = UINT64_MAX, throwing = UINT64_MAX;
 
 private:
@@ -80,7 +83,7 @@ private:
 LoaderOptions options(bool withColour, uint32_t threads, uint64_t heldBytes) {
     LoaderOptions made;
     made.withColour = withColour;
-    made.threads = threads;
+    made.threads = {threads};
     made.heldBytes = heldBytes;
     made.retry = {.attempts = 3, .damagedAttempts = 2, .firstDelaySeconds = 1e-3};
     return made;
@@ -124,6 +127,40 @@ TEST(PageLoader, ItsThreadsGiveWayToThoseThatDraw) {
     many.request({{3, 1}});
     collectAll(many, 1);
     EXPECT_EQ(source->niceness, std::min(own + 14, 19));
+}
+
+/// Two parts: the even pages and the odd ones.
+class TwoParts final : public PageSource {
+public:
+    explicit TwoParts(std::shared_ptr<const FakeSource> pages) : pages_(std::move(pages)) {}
+    Result<PageBytes> read(Request request, bool withColour) const override {
+        return pages_->read(request, withColour);
+    }
+    [[nodiscard]] uint64_t bytesToRead(Request request, bool withColour) const override {
+        return pages_->bytesToRead(request, withColour);
+    }
+    [[nodiscard]] uint32_t partOf(Request request) const override { return request.number % 2; }
+    void interrupt() const override { pages_->interrupt(); }
+
+private:
+    std::shared_ptr<const FakeSource> pages_;
+};
+
+TEST(PageLoader, APartThatAnswersNothingKeepsNoOtherWaiting) {
+    const auto pages = std::make_shared<FakeSource>();
+    pages->stallingOdd = true;
+    LoaderOptions two = options(false, 0, 1 << 20);
+    two.threads = {1, 3};
+    PageLoader loader(std::make_shared<TwoParts>(pages), two);
+    std::vector<Wish> wishes;
+    for (uint64_t page = 0; page < 100; ++page) wishes.push_back({page, page % 2 ? 100.0 : 1.0});
+    loader.request(wishes);
+    for (const Loaded& page : collectAll(loader, 50)) EXPECT_EQ(page.request.number % 2, 0u);
+    std::vector<uint64_t> begun = pages->begun();
+    EXPECT_EQ(std::ranges::count_if(begun, [](uint64_t page) { return page % 2 == 1; }), 3) << "threads of that part";
+    EXPECT_EQ(begun.size(), 53u);
+    pages->letGo();
+    EXPECT_EQ(collectAll(loader, 50).size(), 50u);
 }
 
 TEST(PageLoader, ReadsNoFurtherThanTheNextUpdateTakesIn) {

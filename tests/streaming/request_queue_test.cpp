@@ -60,7 +60,7 @@ TEST(RequestQueue, BackOffGrowsToALimitThenThePageIsGivenUpForGood) {
         EXPECT_EQ(beginNext(queue, now), 7u);
         EXPECT_FALSE(queue.failed(7, ErrorCode::Io, now));
         EXPECT_FALSE(queue.next(now + 0.99 * delay));
-        EXPECT_DOUBLE_EQ(queue.nextTry(), now + delay);
+        EXPECT_DOUBLE_EQ(queue.nextTry(now), now + delay);
         EXPECT_EQ(queue.pending(), 1u) << "it is still wanted: the view has not settled";
         now += delay;
     }
@@ -81,11 +81,24 @@ TEST(RequestQueue, AFailedPageHoldsNobodyUpAndKeepsItsCountWhenItIsNotWanted) {
     EXPECT_FALSE(queue.failed(1, ErrorCode::Io, 0));
     EXPECT_EQ(beginNext(queue), 2u);
     queue.replace({});
-    EXPECT_EQ(queue.nextTry(), std::numeric_limits<double>::infinity());
+    EXPECT_EQ(queue.nextTry(0), std::numeric_limits<double>::infinity());
     queue.replace({{1, 9}});
     EXPECT_FALSE(queue.next(5)) << "a new list does not shorten the wait";
     EXPECT_EQ(beginNext(queue, 10), 1u);
     EXPECT_TRUE(queue.failed(1, ErrorCode::Io, 10));
+}
+
+TEST(RequestQueue, WhatMayNotBeReadNowHoldsNobodyUp) {
+    RequestQueue queue({.attempts = 3, .damagedAttempts = 3, .firstDelaySeconds = 10, .longestDelaySeconds = 10});
+    queue.replace({{1, 9}, {2, 1}});
+    const auto notTheFirst = [](Request request) { return request != Request(1); };
+    EXPECT_FALSE(queue.failed(1, ErrorCode::Io, 0));
+    EXPECT_FALSE(queue.failed(2, ErrorCode::Io, 5));
+    EXPECT_FALSE(queue.next(12, notTheFirst)) << "the second waits still";
+    EXPECT_EQ(queue.nextTry(12), 15) << "the first is due, and waits for something else";
+    ASSERT_TRUE(queue.next(15, notTheFirst));
+    EXPECT_EQ(queue.next(15, notTheFirst)->request, Request(2));
+    EXPECT_EQ(queue.next(15)->request, Request(1));
 }
 
 TEST(RequestQueue, WrongBytesAreGivenUpSooner) {

@@ -280,6 +280,7 @@ TEST(SceneSource, ReadsFromTheDatasetThatHoldsThePage) {
             EXPECT_EQ(scene.bytesToRead(page, true), 1000 + own);
             EXPECT_EQ(scene.originOf(page).file, "file " + std::to_string(i));
             EXPECT_EQ(scene.originOf(page).request, Request(own));
+            EXPECT_EQ(scene.partOf(page), i);
         }
     // What is kept stays within the limit together, and who keeps most may go on keeping it.
     EXPECT_EQ(scene.keepWithin(3000), 0u);
