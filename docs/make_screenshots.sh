@@ -97,7 +97,7 @@ takes steps
 closes
 
 # A budget that is too small, and views that miss pages: what the rays of the last one asked for stays in the inset.
-opens dark 800x600 statue statue.vcp --budget 32M --error-pixels 0.25
+opens dark 800x600 statue statue.vcp --budget 6M --error-pixels 0.25
 key i b
 for view in 7 9 1; do key $view; sleep 2; done
 for _ in 1 2 3; do at 400 200 click 4; sleep 0.5; done

@@ -101,7 +101,7 @@ public:
                 const PixelSum& sum = row[x];
                 const size_t at = size_t(y) * size.x + x;
                 const float light = sum.light + (all - float(sum.hits)) * kBackground;
-                picture.light[at] = std::pow(light / all, 1 / 2.2f);
+                picture.light[at] = std::round(255 * std::pow(light / all, 1 / 2.2f)) / 255;
                 picture.coverage[at] = float(sum.hits) / all;
                 picture.depth[at] = sum.hits > 0 ? sum.depth / float(sum.hits) : INFINITY;
                 const float length = glm::length(sum.normal);
