@@ -12,14 +12,13 @@
 
 #include <fmt/format.h>
 #include <oneapi/tbb/global_control.h>
-#include <oneapi/tbb/parallel_invoke.h>
 #include <oneapi/tbb/task_arena.h>
 
+#include "builder/bin_passes.h"
 #include "builder/checkpoint.h"
 #include "builder/dataset_assembly.h"
 #include "builder/deal.h"
 #include "builder/estimate.h"
-#include "builder/lattice/collapsed_triangles.h"
 #include "builder/level_plan.h"
 #include "builder/memory_plan.h"
 #include "builder/mesh/open_mesh.h"
@@ -105,10 +104,6 @@ private:
             VCP_TRY(resumeMeasures());
         VCP_TRY(chooseGrid(done_.levelsLess));
         if (auto warning = wideCellWarning(options_, measures_)) report_.warnings.push_back(std::move(*warning));
-        plan_.isExact = options_.error <= 0;
-        // Beside soft leaves slabs would have to be continued across walls: their surface does not cover the mesh's.
-        plan_.hasSlabs = plan_.isExact && options_.coarseLeaves == CoarseLeaves::Slabs;
-        plan_.pageBytes = memory_.pageBytes;
         if (stage.empty() || stage == "read")
             VCP_TRY(deal());
         else
@@ -231,9 +226,8 @@ private:
     // Reading and dealing
 
     Result<void> chooseGrid(uint32_t levelsLess) {
-        VCP_TRY_ASSIGN(auto frame, chooseFrame(options_, measures_, levelsLess));
-        VCP_TRY_ASSIGN(plan_.errorTarget, chooseError(options_, measures_, frame));
-        plan_.setPages(frame, FinestPages({frame.log2Cells, frame.levels - 1}));
+        VCP_TRY_ASSIGN(plan_, planLevels(options_, measures_, levelsLess));
+        plan_.pageBytes = memory_.pageBytes;
         levelsLess_ = levelsLess;
         return {};
     }
@@ -269,15 +263,8 @@ private:
         return error;
     }
 
-    [[nodiscard]] bool usesVertexColours() const {
-        return measures_.hasVertexColours &&
-               (options_.colour == ColourChoice::Auto || options_.colour == ColourChoice::Vertex);
-    }
-    [[nodiscard]] bool usesMaterials() const {
-        return measures_.hasMaterials &&
-               (options_.colour == ColourChoice::Auto || options_.colour == ColourChoice::Texture);
-    }
-    [[nodiscard]] bool hasColour() const { return usesVertexColours() || usesMaterials(); }
+    [[nodiscard]] ColourUse colourUse() const { return colourUseOf(options_, measures_); }
+    [[nodiscard]] bool hasColour() const { return colourUse().any(); }
 
     void setUpLevels() {
         for (uint32_t level = 0; level < plan_.frame.levels; ++level) {
@@ -327,8 +314,8 @@ private:
 
     Result<void> dealSoup() {
         std::optional<MaterialColours> colours;
-        if (usesMaterials()) colours.emplace(files_.soup->materials, memory_.vertexBytes);
-        const LatticeSnapper snapper(plan_.frame, colours ? &*colours : nullptr, usesVertexColours(), plan_.pages);
+        if (colourUse().materials) colours.emplace(files_.soup->materials, memory_.vertexBytes);
+        const LatticeSnapper snapper(plan_.frame, colours ? &*colours : nullptr, colourUse().vertices, plan_.pages);
         const double begins = kReadingShare + kDealingShare / 2;
         const Dealing dealing{*files_.soup, snapper, plan_.gridOf(pass_ - 1),
                               [&](double part) { return progress("sorting", begins + kDealingShare / 2 * part); }};
@@ -368,8 +355,12 @@ private:
         };
         if (plan_.isOfSlabs(pass_)) return;
         if (!files_.current) files_.current = bins(pass_);
+        if (!files_.vertices && pass_ + 1 >= plan_.levels() && plan_.finest.bins() > 1)
+            files_.vertices = std::make_unique<RecordBins<VertexImage>>(space_, "normals", plan_.finest.bins(),
+                                                                        memory_.bufferBytes / 4);
         if (!steps()) return;
         files_.next = bins(pass_ - 1);
+        if (pass_ == plan_.levels()) return;
         files_.waiting = std::make_unique<RecordBins<WaitingTriangle>>(space_, fmt::format("waiting{}", pass_),
                                                                        plan_.partitionOf(plan_.levelOf(pass_)).bins(),
                                                                        memory_.bufferBytes / 4);
@@ -453,11 +444,15 @@ private:
         const PagePartition nextPartition = plan_.partitionOf(std::max(pass_ - 1, 0));
         std::optional<LevelSink> sink;
         std::optional<LevelStep> step;
-        if (steps()) {
+        std::optional<VertexStep> vertexStep;
+        if (steps())
             sink.emplace(pass_ > level ? plan_.pages : FinestPages(coarser), nextPartition, *files_.next,
                          plan_.marginCells());
-            step.emplace(pass_ > level, grid, partition, *files_.waiting, *sink);
-        }
+        if (sink && pass_ > level) vertexStep.emplace(grid, partition, *files_.vertices, *sink);
+        if (sink && pass_ == level) step.emplace(grid, partition, *files_.waiting, *sink);
+        const auto handOn = [&](size_t bin, const LatticeMesh& mesh) {
+            return vertexStep ? vertexStep->run(bin, mesh) : step ? step->run(bin, mesh) : Result<void>();
+        };
         const double begins = passBegins(pass_), ends = passEnds(pass_);
         const uint64_t total = std::max<uint64_t>(files_.current->raw().total(), 1);
         uint64_t done = 0;
@@ -467,8 +462,7 @@ private:
                 return begins + (ends - begins) * (double(done) + part * double(count)) / double(total);
             };
             if (bin >= firstBin_) {
-                VCP_TRY(runBin(bin, partition.first()[bin], LevelPlan::endOf(partition, bin, level),
-                               step ? &*step : nullptr, at));
+                VCP_TRY(runBin(bin, partition.first()[bin], LevelPlan::endOf(partition, bin, level), handOn, at));
                 releaseMemory();
                 if (bin + 1 < partition.bins()) VCP_TRY(checkpoint("levels", bin + 1));
             }
@@ -477,8 +471,8 @@ private:
         return endPass();
     }
 
-    template <class At>
-    Result<void> runBin(size_t bin, uint64_t first, uint64_t end, LevelStep* step, At&& at) {
+    template <class HandOn, class At>
+    Result<void> runBin(size_t bin, uint64_t first, uint64_t end, const HandOn& handOn, At&& at) {
         const bool vertices = pass_ == plan_.levels();
         const std::string stage = stageOf(pass_);
         if (!progress(stage, at(0))) return cancelled();
@@ -489,9 +483,17 @@ private:
             }
             // A bin without triangles has no corner that triangles could wait for, so nothing is passed on.
             if (mesh.positions.empty()) return {};
-            if (!vertices) VCP_TRY(buildBin(mesh, first, end, [&](double part) { return progress(stage, at(part)); }));
-            if (step) return step->run(bin, mesh);
-            if (keepsMesh()) mesh_ = std::move(mesh);
+            if (!vertices)
+                VCP_TRY(buildBinPages(plan_, mesh,
+                                      {.pass = pass_,
+                                       .first = first,
+                                       .end = end,
+                                       .settings = [this](int level) { return settingsOf(level); },
+                                       .pages = files_.spools,
+                                       .surfaces = files_.surfaces,
+                                       .progress = [&](double part) { return progress(stage, at(part)); }}));
+            if (!keepsMesh()) return handOn(bin, mesh);
+            mesh_ = std::move(mesh);
             return {};
         });
     }
@@ -500,60 +502,27 @@ private:
     Result<LatticeMesh> loadMesh(size_t bin) {
         VCP_TRY_ASSIGN(auto soup, files_.current->load(bin));
         if (pass_ < plan_.levels()) {
-            if (pass_ + 1 == plan_.levels())
-                for (LatticeTriangle& t : soup) t.part = parts_->decided(t.part);
+            if (pass_ + 1 == plan_.levels()) VCP_TRY(complete(soup, bin));
             return meshOf(soup, hasColour());
         }
-        const std::vector<Corners> changed = keepThin(soup, bin);
-        LatticeMesh mesh = meshOf(soup, hasColour());
-        std::vector<LatticeTriangle>().swap(soup);
-        Result<void> noted;
-        tbb::parallel_invoke(
-            [&] { computeNormals(mesh); },
-            [&] { noted = files_.parts->add(mesh, changed, [&](glm::i32vec3 p) { return isIn(bin, p); }); });
-        VCP_TRY(noted);
-        return mesh;
+        return meshWithNormals(plan_, std::move(soup), bin, hasColour(), *files_.parts);
+    }
+
+    /// Gives triangles of the finest level what was not known yet when they were handed on.
+    Result<void> complete(std::vector<LatticeTriangle>& soup, size_t bin) {
+        for (LatticeTriangle& t : soup) t.part = meshParts_->decided(t.part);
+        if (!files_.vertices) return {};
+        VCP_TRY_ASSIGN(auto vertices, files_.vertices->load(bin));
+        if (joinVertices(soup, std::move(vertices))) return {};
+        return damagedTempFile(space_.folder().path() / files_.vertices->raw().fileName());
     }
 
     /// Finds which parts of the mesh are closed, once all bins have noted theirs.
     Result<void> joinParts() {
-        if (parts_) return {};
-        VCP_TRY_ASSIGN(parts_, files_.parts->join());
+        if (meshParts_) return {};
+        PartNotes* const notes = files_.parts.get();
+        VCP_TRY_ASSIGN(meshParts_, PartNotes::join(std::span(&notes, 1)));
         return {};
-    }
-
-    /// Whether a point of the deepest level's lattice is in a bin.
-    [[nodiscard]] bool isIn(size_t bin, glm::i32vec3 p) const {
-        return plan_.finest.binOf(plan_.gridOf(plan_.levels() - 1).pageOf(p)) == bin;
-    }
-
-    /// Builds the pass's pages from code `first` to before `end`. Leaves `mesh` on the lattice of their coarsest level.
-    Result<void> buildBin(LatticeMesh& mesh, uint64_t first, uint64_t end, const std::function<bool(double)>& report) {
-        const bool isFinest = pass_ + 1 == plan_.levels();
-        const FinestPages pages = isFinest ? plan_.pages : FinestPages(plan_.gridOf(pass_));
-        const double margin = isFinest && plan_.isExact ? kExactMarginCells : kBinMarginCells;
-        const std::vector<LevelBins> levels = binTriangles(mesh, pages, margin, first, end);
-        size_t total = 0, done = 0;
-        for (const LevelBins& level : levels) total += level.bins.triangles.size();
-        uint32_t lattice = pages.deepest();
-        for (const auto& [level, bins] : levels) {
-            for (; lattice > level; --lattice) halveLattice(mesh);
-            const size_t count = bins.triangles.size();
-            VCP_TRY(
-                buildPages(settingsOf(int(level)), mesh, bins, files_.spools[level], surfacesOf(int(level)),
-                           [&](double part) { return report((double(done) + part * double(count)) / double(total)); }));
-            done += count;
-        }
-        return {};
-    }
-
-    /// Keeps slivers and crumbs that would vanish on the lattice.
-    std::vector<Corners> keepThin(std::vector<LatticeTriangle>& soup, size_t bin) const {
-        const PageGrid grid = plan_.gridOf(plan_.levelOf(pass_));
-        return keepCollapsed(
-            soup, [&](glm::i32vec3 p) { return isIn(bin, p); },
-            [&](glm::i32vec3 p, glm::i32vec3 q) { return grid.pageOf(p) == grid.pageOf(q); },
-            [&](glm::i32vec3 p) { return plan_.pages.stepAt(p); });
     }
 
     Result<void> endPass() {
@@ -561,6 +530,9 @@ private:
         // What the mesh was made from stays until its pages are made: an interrupted build goes on from there.
         if (keepsMesh()) return {};
         if (files_.next) VCP_TRY(files_.next->raw().flush());
+        if (files_.vertices) VCP_TRY(files_.vertices->raw().flush());
+        std::unique_ptr<RecordBins<VertexImage>> joined;
+        if (pass_ < plan_.levels()) joined = std::move(files_.vertices);
         auto finished = std::move(files_.current);
         auto waited = std::move(files_.waiting);
         files_.current = std::move(files_.next);
@@ -570,6 +542,7 @@ private:
         ++pass_;
         if (finished) finished->raw().remove();
         if (waited) waited->raw().remove();
+        if (joined) joined->raw().remove();
         if (plan_.isOfSlabs(pass_)) files_.surfaces[size_t(pass_) + 1].remove();
         return {};
     }
@@ -584,27 +557,13 @@ private:
     // Writing
 
     Result<void> write() {
-        FileHeader header = headerOf(measures_, plan_.frame, plan_.errorTarget, hasColour());
-        if (plan_.hasSlabs) header.flags |= kFlagCovering;
         VCP_TRY(joinParts());
-        header.flags |= kFlagParts;
-        header.parts = parts_->counts.parts;
-        header.closedParts = parts_->counts.closed;
-        header.openEdges = parts_->counts.openEdges;
+        FileHeader header = headerOf(plan_, measures_, hasColour(), meshParts_->counts);
         VCP_TRY_ASSIGN(report_.fileBytes,
                        assembleDataset(files_.spools, header, options_.output, rules(), [this](double part) {
                            return progress("writing", 1 - kWritingShare + kWritingShare * part);
                        }));
-        report_.triangles = header.triangles;
-        report_.degenerateTriangles = header.degenerateTriangles;
-        report_.vertices = header.vertices;
-        report_.levels = header.levels;
-        report_.subvolumes = header.pages;
-        report_.leaves = header.leaves;
-        report_.hardLeaves = header.hardLeaves;
-        report_.cell = header.cell;
-        report_.errorTarget = header.errorTarget;
-        report_.certifiedErrorMax = header.certifiedErrorMax;
+        describe(header, report_);
         progress("done", 1);
         return {};
     }
@@ -634,8 +593,8 @@ private:
     uint64_t finestPages_ = 0;  ///< that hold the mesh; 0 where these are so few that they were not counted
     BuildReport report_;
     WorkFiles files_;
-    std::optional<MeshParts> parts_;  ///< once they are joined
-    LatticeMesh mesh_;                ///< what a pass hands to the next one, where it keepsMesh()
+    std::optional<MeshParts> meshParts_;  ///< once they are joined
+    LatticeMesh mesh_;                    ///< what a pass hands to the next one, where it keepsMesh()
     int pass_ = 0;
     size_t firstBin_ = 0;  ///< where the pass that is resumed begins
 };

@@ -14,7 +14,7 @@ namespace {
 using nlohmann::json;
 
 // Version of the temporary files; a build does not continue from another version's.
-constexpr int kTempVersion = 10;
+constexpr int kTempVersion = 11;
 
 json jsonOf(glm::dvec3 v) { return {v.x, v.y, v.z}; }
 
@@ -157,6 +157,7 @@ std::vector<std::pair<const char*, RawBins*>> binsOf(WorkFiles& files) {
     if (files.current) bins.emplace_back("current", &files.current->raw());
     if (files.next) bins.emplace_back("next", &files.next->raw());
     if (files.parts) bins.emplace_back("parts", &files.parts->raw());
+    if (files.vertices) bins.emplace_back("vertices", &files.vertices->raw());
     if (files.waiting) bins.emplace_back("waiting", &files.waiting->raw());
     return bins;
 }
@@ -259,14 +260,15 @@ Result<void> WorkFiles::reopen(const Recorded& recorded, TempSpace& space) {
                      .message = fmt::format("{}; build again from the start", what),
                      .file = (space.folder().path() / kJournalName).string()};
     };
-    // The next level's bins are made with the first bin of a pass.
-    const bool isBegun = recorded.bin > 0;
+    // What a pass makes, the next level's bins among it, is there from its first bin on.
+    const bool isBegun = recorded.bin > 0, areVerticesMade = recorded.pass == int(spools.size());
     std::vector<std::string> kept{kJournalName};
     std::vector<std::pair<RawBins*, uint64_t>> bins;
     for (const auto& [name, raw] : binsOf(*this)) {
         const auto found = recorded.files.bins.find(name);
-        const bool isNeeded =
-            isBegun || (raw != (next ? &next->raw() : nullptr) && raw != (waiting ? &waiting->raw() : nullptr));
+        const bool isMade = (next && raw == &next->raw()) || (waiting && raw == &waiting->raw()) ||
+                            (vertices && raw == &vertices->raw() && areVerticesMade);
+        const bool isNeeded = isBegun || !isMade;
         if (found == recorded.files.bins.end() && isNeeded) return unlike("does not say how long all files were");
         if (found == recorded.files.bins.end() || found->second == 0) continue;
         bins.emplace_back(raw, found->second);

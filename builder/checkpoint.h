@@ -16,6 +16,7 @@
 #include "builder/ingest.h"
 #include "builder/level/closed_parts.h"
 #include "builder/level/level_step.h"
+#include "builder/level/vertex_step.h"
 #include "builder/spill/page_spool.h"
 #include "builder/spill/record_bins.h"
 
@@ -57,6 +58,8 @@ struct WorkFiles {
     std::unique_ptr<Soup> soup;
     std::unique_ptr<RecordBins<LatticeTriangle>> current, next;  ///< bins of this pass and of the pass after it
     std::unique_ptr<RecordBins<WaitingTriangle>> waiting;
+    std::unique_ptr<RecordBins<VertexImage>>
+        vertices;  ///< what bins of the finest level know of each other's triangles
     std::unique_ptr<PartNotes> parts;
     std::deque<PageSpool> spools;    ///< finished pages of each level, coarse first
     std::deque<PageSpool> surfaces;  ///< the surface in them, where levels are made from that (slab_pages.h)

@@ -219,10 +219,12 @@ Result<void> PartNotes::add(LatticeMesh& mesh, std::span<const Corners> changed,
 Result<void> PartNotes::readFirst(MeshParts& parts, uint64_t& undecided) {
     VCP_TRY(notes_.raw().flush(0));
     VCP_TRY_ASSIGN(const auto notes, notes_.load(0));
+    const uint64_t first = undecided;
     for (const PartRecord& note : notes) {
         if (note.kind == PartRecord::Kind::Open) {
-            if (parts.isOpen.size() <= note.part) parts.isOpen.resize(size_t{note.part} + 1);
-            parts.isOpen[note.part] = true;
+            const size_t number = first + note.part;
+            if (parts.isOpen.size() <= number) parts.isOpen.resize(number + 1);
+            parts.isOpen[number] = true;
             continue;
         }
         undecided += note.part;
@@ -234,14 +236,22 @@ Result<void> PartNotes::readFirst(MeshParts& parts, uint64_t& undecided) {
     return {};
 }
 
-Result<MeshParts> PartNotes::join() {
+Result<MeshParts> PartNotes::join(std::span<PartNotes* const> all) {
     MeshParts parts;
     uint64_t undecided = 0;
-    VCP_TRY(notes_.raw().flush());
-    VCP_TRY(readFirst(parts, undecided));
+    for (PartNotes* const each : all) {
+        VCP_TRY(each->notes_.raw().flush());
+        parts.first.push_back(undecided);
+        VCP_TRY(each->readFirst(parts, undecided));
+    }
     Sets sets(undecided);
     for (size_t bin = 1; bin <= kSharedBins; ++bin) {
-        VCP_TRY_ASSIGN(auto shared, notes_.load(bin));
+        std::vector<PartRecord> shared;
+        for (size_t k = 0; k < all.size(); ++k) {
+            VCP_TRY_ASSIGN(auto notes, all[k]->notes_.load(bin));
+            for (PartRecord& note : notes) note.part += uint32_t(parts.first[k]);
+            shared.insert(shared.end(), notes.begin(), notes.end());
+        }
         std::sort(shared.begin(), shared.end(), isBefore);
         for (size_t i = 1; i < shared.size(); ++i)
             if (shared[i].at == shared[i - 1].at) sets.join(shared[i].part, shared[i - 1].part);

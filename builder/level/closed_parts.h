@@ -26,11 +26,13 @@ struct PartCounts {
 /// The parts of a whole mesh.
 struct MeshParts {
     PartCounts counts;
-    std::vector<bool> isOpen;  ///< of those that no bin could decide
+    std::vector<bool> isOpen;     ///< of those that no bin could decide
+    std::vector<uint64_t> first;  ///< number of the first of these of each of the notes that were joined
 
-    /// Returns kClosedPart or kOpenPart for a part as a bin called it.
-    [[nodiscard]] uint32_t decided(uint32_t part) const {
-        return part < kFirstUndecidedPart ? part : isOpen[part - kFirstUndecidedPart] ? kOpenPart : kClosedPart;
+    /// Returns kClosedPart or kOpenPart for a part as a bin called it. `notes`: which of those joined are the bin's.
+    [[nodiscard]] uint32_t decided(uint32_t part, size_t notes = 0) const {
+        if (part < kFirstUndecidedPart) return part;
+        return isOpen[first[notes] + part - kFirstUndecidedPart] ? kOpenPart : kClosedPart;
     }
 };
 
@@ -42,7 +44,7 @@ struct PartRecord {
         Counts,  ///< a bin has `part` undecided parts and, besides, at.x parts, at.y closed ones; and at.z open edges
     };
     Kind kind;
-    uint32_t part;  ///< number among all that are undecided
+    uint32_t part;  ///< number among all that are undecided in these notes
     glm::i32vec3 at;
 };
 
@@ -51,12 +53,13 @@ class PartNotes {
 public:
     PartNotes(TempSpace& space, uint64_t bufferBytes);
 
-    /// Finds the parts of a bin and sets `mesh.parts`; bins come in ascending order. `mesh`: all triangles at the
+    /// Finds the parts of a bin and sets `mesh.parts`; bins come in any order. `mesh`: all triangles at the
     /// vertices that the bin `owns`. `changed`: what keepCollapsed returned for it. Errors: Io.
     Result<void> add(LatticeMesh& mesh, std::span<const Corners> changed,
                      const std::function<bool(glm::i32vec3)>& owns);
-    /// Returns the parts of the mesh that all bins together are. Errors: Io; InvalidInput (damaged).
-    Result<MeshParts> join();
+    /// Returns the parts of the mesh that all bins together are, whose notes lie in one or several places. Errors: Io;
+    /// InvalidInput (damaged).
+    static Result<MeshParts> join(std::span<PartNotes* const> all);
 
     [[nodiscard]] RawBins& raw() { return notes_.raw(); }
 

@@ -1,29 +1,31 @@
 #include "builder/level/level_step.h"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
-#include <mutex>
 
 #include <oneapi/tbb/blocked_range.h>
-#include <oneapi/tbb/enumerable_thread_specific.h>
 #include <oneapi/tbb/parallel_for.h>
 #include <glm/geometric.hpp>
 
 #include "builder/level/stray_bound.h"
+#include "builder/level/triangle_batches.h"
 
 namespace vcp {
 
-Result<void> LevelSink::Batch::add(const LatticeTriangle& t) {
-    // Where one bin has all pages, no other needs to be looked for.
-    if (sink_.partition_.bins() == 1) return batch_.add(0, t);
+const std::vector<size_t>& LevelSink::Batch::binsOf(const LatticeTriangle& t) {
     // A triangle seldom spans more than two bins, so the list of those seen is short.
     touched_.clear();
     sink_.pages_.forPagesNear(t.corner, sink_.marginCells_, [&](uint32_t level, uint64_t page) {
         const size_t bin = sink_.partition_.binOf(sink_.pages_.firstCode(level, page));
         if (std::find(touched_.begin(), touched_.end(), bin) == touched_.end()) touched_.push_back(bin);
     });
-    for (const size_t bin : touched_) VCP_TRY(batch_.add(bin, t));
+    return touched_;
+}
+
+Result<void> LevelSink::Batch::add(const LatticeTriangle& t) {
+    // Where one bin has all pages, no other needs to be looked for.
+    if (sink_.partition_.bins() == 1) return batch_.add(0, t);
+    for (const size_t bin : binsOf(t)) VCP_TRY(batch_.add(bin, t));
     return {};
 }
 
@@ -37,7 +39,6 @@ struct LevelStep::Images {
 /// Whether all that the image of a vertex depends on is within the bin's surroundings.
 bool LevelStep::isKnown(size_t bin, glm::i32vec3 p) const {
     if (binOf(p) == bin) return true;
-    if (first_) return false;
     // The coarse cell must lie within a page of the bin, widened.
     const glm::dvec3 low = glm::dvec3(p >> int(PageGrid::kLog2LatticePerCell + 1)) * 2.0;
     const double edge = grid_.edgeCells();
@@ -70,13 +71,7 @@ Result<void> LevelStep::pass(const WaitingTriangle& w, LevelSink::Batch& batch) 
             if (!(w.known >> i & 1)) lowest = std::min(lowest, binOf(w.from.corner[i]));
         return waiting_.append(lowest, std::span(&w, 1));
     }
-    if (!first_) return batch.add(longImage(w.from, w.image));
-    LatticeTriangle t = w.from;
-    for (int i = 0; i < 3; ++i) {
-        t.colour[i] = w.image[i].colour;
-        t.normal[i] = w.image[i].normal;
-    }
-    return batch.add(t);
+    return batch.add(longImage(w.from, w.image));
 }
 
 Result<void> LevelStep::stepWaiting(size_t bin, const LatticeMesh& mesh, const Images& images) {
@@ -99,68 +94,45 @@ Result<void> LevelStep::stepWaiting(size_t bin, const LatticeMesh& mesh, const I
     return batch.flush();
 }
 
-namespace {
-
-/// Runs work(k, batch) for all k of [0, count) on all threads, each with a batch; the first error ends it.
-template <class Work>
-Result<void> inBatches(LevelSink& sink, size_t count, const Work& work) {
-    tbb::enumerable_thread_specific<LevelSink::Batch> batches([&] { return LevelSink::Batch(sink); });
-    std::mutex mutex;
-    std::atomic<bool> failed = false;
-    Result<void> result;
-    tbb::parallel_for(tbb::blocked_range<size_t>(0, count, 4096), [&](const auto& range) {
-        LevelSink::Batch& batch = batches.local();
-        for (size_t k = range.begin(); k < range.end() && !failed; ++k) {
-            auto done = work(k, batch);
-            if (done) continue;
-            const std::scoped_lock lock(mutex);
-            if (!failed.exchange(true)) result = done;
-        }
-    });
-    if (!result) return result;
-    for (auto& batch : batches) VCP_TRY(batch.flush());
-    return {};
-}
-
-}  // namespace
-
 Result<void> LevelStep::stepShort(size_t bin, const LatticeMesh& mesh, const VertexClusters& clusters) {
     const CoarseTriangles coarse = coarseTriangles(mesh, clusters);
     const std::vector<float> stray = boundStray(mesh, clusters, coarse);
     const LatticeMesh& to = coarse.mesh;
-    return inBatches(sink_, to.triangles.size(), [&](size_t k, LevelSink::Batch& batch) -> Result<void> {
-        LatticeTriangle t;
-        size_t lowest = partition_.bins();
-        for (int i = 0; i < 3; ++i) {
-            const uint32_t v = to.triangles[k][i];
-            t.corner[i] = to.positions[v];
-            t.colour[i] = to.colours.empty() ? 0xffffffffu : to.colours[v];
-            t.normal[i] = to.normals[v];
-            lowest = std::min(lowest, binOf(to.positions[v] * 2));
-        }
-        // Images near the bin's ends belong to other bins, and are not wholly known here.
-        if (lowest != bin) return {};
-        t.stray = stray[k];
-        return batch.add(t);
-    });
+    return inBatches([&] { return LevelSink::Batch(sink_); }, to.triangles.size(),
+                     [&](size_t k, LevelSink::Batch& batch) -> Result<void> {
+                         LatticeTriangle t;
+                         size_t lowest = partition_.bins();
+                         for (int i = 0; i < 3; ++i) {
+                             const uint32_t v = to.triangles[k][i];
+                             t.corner[i] = to.positions[v];
+                             t.colour[i] = to.colours.empty() ? 0xffffffffu : to.colours[v];
+                             t.normal[i] = to.normals[v];
+                             lowest = std::min(lowest, binOf(to.positions[v] * 2));
+                         }
+                         // Images near the bin's ends belong to other bins, and are not wholly known here.
+                         if (lowest != bin) return {};
+                         t.stray = stray[k];
+                         return batch.add(t);
+                     });
 }
 
 Result<void> LevelStep::stepLong(size_t bin, const LatticeMesh& mesh, const Images& images) {
-    return inBatches(sink_, mesh.triangles.size(), [&](size_t k, LevelSink::Batch& batch) -> Result<void> {
-        const auto& v = mesh.triangles[k];
-        if (std::min({images.bin[v[0]], images.bin[v[1]], images.bin[v[2]]}) != bin) return {};
-        if (!first_ && !isLong(mesh.positions[v[0]], mesh.positions[v[1]], mesh.positions[v[2]])) return {};
-        WaitingTriangle w{};
-        w.from.stray = mesh.stray[k];
-        if (!mesh.parts.empty()) w.from.part = mesh.parts[v[0]];
-        for (int i = 0; i < 3; ++i) {
-            w.from.corner[i] = mesh.positions[v[i]];
-            if (!images.known[v[i]]) continue;
-            w.image[i] = images.image[v[i]];
-            w.known |= 1u << i;
-        }
-        return pass(w, batch);
-    });
+    return inBatches([&] { return LevelSink::Batch(sink_); }, mesh.triangles.size(),
+                     [&](size_t k, LevelSink::Batch& batch) -> Result<void> {
+                         const auto& v = mesh.triangles[k];
+                         if (std::min({images.bin[v[0]], images.bin[v[1]], images.bin[v[2]]}) != bin) return {};
+                         if (!isLong(mesh.positions[v[0]], mesh.positions[v[1]], mesh.positions[v[2]])) return {};
+                         WaitingTriangle w{};
+                         w.from.stray = mesh.stray[k];
+                         if (!mesh.parts.empty()) w.from.part = mesh.parts[v[0]];
+                         for (int i = 0; i < 3; ++i) {
+                             w.from.corner[i] = mesh.positions[v[i]];
+                             if (!images.known[v[i]]) continue;
+                             w.image[i] = images.image[v[i]];
+                             w.known |= 1u << i;
+                         }
+                         return pass(w, batch);
+                     });
 }
 
 Result<void> LevelStep::run(size_t bin, const LatticeMesh& mesh) {
@@ -169,16 +141,11 @@ Result<void> LevelStep::run(size_t bin, const LatticeMesh& mesh) {
     const auto colourOf = [](const std::vector<uint32_t>& colours, size_t v) {
         return colours.empty() ? 0xffffffffu : colours[v];
     };
-    if (first_) {
-        for (size_t v = 0; v < mesh.positions.size(); ++v)
-            images.image[v] = {mesh.positions[v], colourOf(mesh.colours, v), mesh.normals[v]};
-    } else {
-        const VertexClusters clusters = clusterVertices(mesh);
-        for (size_t v = 0; v < mesh.positions.size(); ++v)
-            if (const uint32_t c = clusters.ofVertex[v]; c != VertexClusters::kNone)
-                images.image[v] = {clusters.positions[c], colourOf(clusters.colours, c), clusters.normals[c]};
-        VCP_TRY(stepShort(bin, mesh, clusters));
-    }
+    const VertexClusters clusters = clusterVertices(mesh);
+    for (size_t v = 0; v < mesh.positions.size(); ++v)
+        if (const uint32_t c = clusters.ofVertex[v]; c != VertexClusters::kNone)
+            images.image[v] = {clusters.positions[c], colourOf(clusters.colours, c), clusters.normals[c]};
+    VCP_TRY(stepShort(bin, mesh, clusters));
     VCP_TRY(stepWaiting(bin, mesh, images));
     return stepLong(bin, mesh, images);
 }

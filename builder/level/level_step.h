@@ -7,8 +7,7 @@
 // away, it waits for the bin that has that corner, and takes the known images along. Bins are worked on in ascending
 // order, so none is visited twice.
 //
-// The first step leads from the snapped triangles to the finest level: there a vertex stays where it is, and
-// gets its normal.
+// How triangles first come to the finest level is told in vertex_step.h.
 #pragma once
 
 #include <atomic>
@@ -46,6 +45,8 @@ public:
     public:
         explicit Batch(LevelSink& sink) : sink_(sink), batch_(sink.bins_) {}
         Result<void> add(const LatticeTriangle& triangle);
+        /// Returns the bins that a triangle goes into; valid until the next call.
+        const std::vector<size_t>& binsOf(const LatticeTriangle& triangle);
         Result<void> flush() { return batch_.flush(); }
 
     private:
@@ -64,11 +65,10 @@ private:
 /// Steps one level. One thread calls, in ascending order of bins; the calling arena's threads do the work.
 class LevelStep {
 public:
-    /// `first`: the step leads from the snapped triangles to the finest level. `grid`, `partition`: those of the level
-    /// stepped from.
-    LevelStep(bool first, const PageGrid& grid, const PagePartition& partition, RecordBins<WaitingTriangle>& waiting,
+    /// `grid`, `partition`: those of the level stepped from.
+    LevelStep(const PageGrid& grid, const PagePartition& partition, RecordBins<WaitingTriangle>& waiting,
               LevelSink& sink)
-        : first_(first), grid_(grid), partition_(partition), waiting_(waiting), sink_(sink) {}
+        : grid_(grid), partition_(partition), waiting_(waiting), sink_(sink) {}
 
     /// `mesh`: all triangles of the bin, with their normals.
     Result<void> run(size_t bin, const LatticeMesh& mesh);
@@ -84,7 +84,6 @@ private:
     /// Emits a triangle whose images are all known; else lets it wait.
     Result<void> pass(const WaitingTriangle& w, LevelSink::Batch& batch);
 
-    bool first_;
     const PageGrid& grid_;
     const PagePartition& partition_;
     RecordBins<WaitingTriangle>& waiting_;

@@ -8,7 +8,9 @@
 
 #include <gtest/gtest.h>
 
+#include "builder/level/vertex_step.h"
 #include "builder/measure/mesh_bvh.h"
+#include "octree/surface/vertex_normal.h"
 #include "tests/support/lattice_meshes.h"
 #include "tests/support/test_folder.h"
 #include "tests/support/test_meshes.h"
@@ -55,11 +57,11 @@ public:
             bins.erase(std::unique(bins.begin(), bins.end()), bins.end());
             for (const size_t bin : bins) EXPECT_TRUE(bins_->append(bin, std::span(&t, 1)).ok());
         }
-        step(true, level_);
+        findNormals();
     }
 
     void coarsen() {
-        step(false, level_ - 1);
+        step(level_ - 1);
         --level_;
     }
 
@@ -89,21 +91,47 @@ private:
         return std::make_unique<RecordBins<LatticeTriangle>>(space_, name, partition.bins(), 1 << 20);
     }
 
-    void step(bool first, uint32_t to) {
+    /// Brings the triangles to the finest level, the last bin first and the first one last.
+    void findNormals() {
+        const PageGrid grid{kLog2Cells, level_};
+        auto made = newBins("level", partition_);
+        RecordBins<VertexImage> vertices(space_, "vertices", partition_.bins(), 1 << 16);
+        LevelSink sink(FinestPages(grid), partition_, *made);
+        VertexStep step(grid, partition_, vertices, sink);
+        EXPECT_TRUE(bins_->raw().flush().ok());
+        for (size_t bin = partition_.bins(); bin-- > 0;) {
+            const auto soup = bins_->load(bin);
+            ASSERT_TRUE(soup.ok());
+            if (soup->empty()) continue;
+            LatticeMesh mesh = meshOf(*soup, true);
+            computeNormals(mesh);
+            ASSERT_TRUE(step.run(bin, mesh).ok());
+        }
+        EXPECT_TRUE(made->raw().flush().ok() && vertices.raw().flush().ok());
+        bins_ = newBins("joined", partition_);
+        for (size_t bin = 0; bin < partition_.bins(); ++bin) {
+            auto soup = made->load(bin);
+            auto known = vertices.load(bin);
+            ASSERT_TRUE(soup.ok() && known.ok());
+            EXPECT_TRUE(joinVertices(*soup, *known));
+            EXPECT_TRUE(bins_->append(bin, *soup).ok());
+        }
+        EXPECT_TRUE(bins_->raw().flush().ok());
+    }
+
+    void step(uint32_t to) {
         const PageGrid from{kLog2Cells, level_}, coarser{kLog2Cells, to};
-        const PagePartition next = first ? partition_ : partition_.coarser();
+        const PagePartition next = partition_.coarser();
         auto made = newBins("level" + std::to_string(to), next);
         RecordBins<WaitingTriangle> waiting(space_, "waiting", partition_.bins(), 1 << 16);
         LevelSink sink(FinestPages(coarser), next, *made);
-        LevelStep step(first, from, partition_, waiting, sink);
+        LevelStep step(from, partition_, waiting, sink);
         for (size_t bin = 0; bin < partition_.bins(); ++bin) {
             EXPECT_TRUE(bins_->raw().flush().ok());
             const auto soup = bins_->load(bin);
             ASSERT_TRUE(soup.ok());
             if (soup->empty()) continue;
-            LatticeMesh mesh = meshOf(*soup, true);
-            if (first) computeNormals(mesh);
-            ASSERT_TRUE(step.run(bin, mesh).ok());
+            ASSERT_TRUE(step.run(bin, meshOf(*soup, true)).ok());
         }
         EXPECT_TRUE(made->raw().flush().ok());
         bins_ = std::move(made);
@@ -201,7 +229,7 @@ TEST(LevelStep, VerticesOnPageWalls) {
     expectPartitionsAgree(mesh, 1);
 }
 
-TEST(LevelStep, FirstStepKeepsPositionsAndBringsNormals) {
+TEST(VertexStep, KeepsPositionsAndBringsNormals) {
     const Soup soup = test::soupOf(test::torusMesh({31, 33, 30}, 20, 6, 60, 30));
     LatticeMesh want = meshOf(soup, true);
     computeNormals(want);
@@ -210,6 +238,21 @@ TEST(LevelStep, FirstStepKeepsPositionsAndBringsNormals) {
     EXPECT_EQ(have.triangles, want.triangles);
     EXPECT_EQ(have.normals, want.normals);
     EXPECT_EQ(have.stray, want.stray);
+}
+
+TEST(VertexStep, NoNormalIsCalledUnknown) {
+    NormalGridPoint point{};
+    EXPECT_FALSE(gridPointOf(kUnknownNormal, point));
+}
+
+TEST(VertexStep, SaysThatAVertexIsMissing) {
+    std::vector<LatticeTriangle> triangles(1);
+    triangles[0] = {{{0, 0, 0}, {9, 0, 0}, {0, 9, 0}}, {1, 2, 3}, {4, kUnknownNormal, 6}, 0};
+    EXPECT_FALSE(joinVertices(triangles, {{{9, 0, 1}, 7, 8}}));
+    EXPECT_TRUE(joinVertices(triangles, {{{9, 0, 1}, 7, 8}, {{9, 0, 0}, 10, 11}}));
+    EXPECT_EQ(triangles[0].colour[1], 10u);
+    EXPECT_EQ(triangles[0].normal[1], 11u);
+    EXPECT_EQ(triangles[0].normal[2], 6u);
 }
 
 /// Corners, edge middles and points inside.

@@ -1,0 +1,86 @@
+#include "builder/bin_passes.h"
+
+#include <oneapi/tbb/parallel_invoke.h>
+
+#include "builder/dataset_assembly.h"
+#include "builder/lattice/collapsed_triangles.h"
+#include "builder/slab_pages.h"
+
+namespace vcp {
+
+ColourUse colourUseOf(const BuildOptions& options, const SoupMeasures& measures) {
+    const bool all = options.colour == ColourChoice::Auto;
+    return {.vertices = measures.hasVertexColours && (all || options.colour == ColourChoice::Vertex),
+            .materials = measures.hasMaterials && (all || options.colour == ColourChoice::Texture)};
+}
+
+Result<LevelPlan> planLevels(const BuildOptions& options, const SoupMeasures& measures, uint32_t levelsLess) {
+    LevelPlan plan;
+    VCP_TRY_ASSIGN(auto frame, chooseFrame(options, measures, levelsLess));
+    VCP_TRY_ASSIGN(plan.errorTarget, chooseError(options, measures, frame));
+    plan.setPages(frame, FinestPages({frame.log2Cells, frame.levels - 1}));
+    plan.isExact = options.error <= 0;
+    // Beside soft leaves slabs would have to be continued across walls: their surface does not cover the mesh's.
+    plan.hasSlabs = plan.isExact && options.coarseLeaves == CoarseLeaves::Slabs;
+    return plan;
+}
+
+Result<LatticeMesh> meshWithNormals(const LevelPlan& plan, std::vector<LatticeTriangle> soup, size_t bin,
+                                    bool withColour, PartNotes& parts) {
+    const PageGrid grid = plan.gridOf(plan.levels() - 1);
+    const auto isIn = [&](glm::i32vec3 p) { return plan.finest.binOf(grid.pageOf(p)) == bin; };
+    const std::vector<Corners> changed = keepCollapsed(
+        soup, isIn, [&](glm::i32vec3 p, glm::i32vec3 q) { return grid.pageOf(p) == grid.pageOf(q); },
+        [&](glm::i32vec3 p) { return plan.pages.stepAt(p); });
+    LatticeMesh mesh = meshOf(soup, withColour);
+    std::vector<LatticeTriangle>().swap(soup);
+    Result<void> noted;
+    tbb::parallel_invoke([&] { computeNormals(mesh); }, [&] { noted = parts.add(mesh, changed, isIn); });
+    VCP_TRY(noted);
+    return mesh;
+}
+
+Result<void> buildBinPages(const LevelPlan& plan, LatticeMesh& mesh, const BinPages& bin) {
+    const bool isFinest = bin.pass + 1 == plan.levels();
+    const FinestPages pages = isFinest ? plan.pages : FinestPages(plan.gridOf(bin.pass));
+    const double margin = isFinest && plan.isExact ? kExactMarginCells : kBinMarginCells;
+    const std::vector<LevelBins> levels = binTriangles(mesh, pages, margin, bin.first, bin.end);
+    size_t total = 0, done = 0;
+    for (const LevelBins& level : levels) total += level.bins.triangles.size();
+    uint32_t lattice = pages.deepest();
+    for (const auto& [level, bins] : levels) {
+        for (; lattice > level; --lattice) halveLattice(mesh);
+        const size_t count = bins.triangles.size();
+        PageSpool* const surfaces = level > 0 && !bin.surfaces.empty() ? &bin.surfaces[level] : nullptr;
+        VCP_TRY(buildPages(bin.settings(int(level)), mesh, bins, bin.pages[level], surfaces, [&](double part) {
+            return bin.progress((double(done) + part * double(count)) / double(total));
+        }));
+        done += count;
+    }
+    return {};
+}
+
+FileHeader headerOf(const LevelPlan& plan, const SoupMeasures& measures, bool hasColour, const PartCounts& parts) {
+    FileHeader header = headerOf(measures, plan.frame, plan.errorTarget, hasColour);
+    if (plan.hasSlabs) header.flags |= kFlagCovering;
+    header.flags |= kFlagParts;
+    header.parts = parts.parts;
+    header.closedParts = parts.closed;
+    header.openEdges = parts.openEdges;
+    return header;
+}
+
+void describe(const FileHeader& header, BuildFigures& figures) {
+    figures.triangles = header.triangles;
+    figures.degenerateTriangles = header.degenerateTriangles;
+    figures.vertices = header.vertices;
+    figures.levels = header.levels;
+    figures.subvolumes = header.pages;
+    figures.leaves = header.leaves;
+    figures.hardLeaves = header.hardLeaves;
+    figures.cell = header.cell;
+    figures.errorTarget = header.errorTarget;
+    figures.certifiedErrorMax = header.certifiedErrorMax;
+}
+
+}  // namespace vcp
