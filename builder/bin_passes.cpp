@@ -1,5 +1,7 @@
 #include "builder/bin_passes.h"
 
+#include <sys/resource.h>
+
 #include <oneapi/tbb/parallel_invoke.h>
 
 #include "builder/dataset_assembly.h"
@@ -81,6 +83,12 @@ void describe(const FileHeader& header, BuildFigures& figures) {
     figures.cell = header.cell;
     figures.errorTarget = header.errorTarget;
     figures.certifiedErrorMax = header.certifiedErrorMax;
+}
+
+uint64_t peakRssBytes() {
+    rusage usage{};
+    getrusage(RUSAGE_SELF, &usage);
+    return uint64_t(usage.ru_maxrss) * 1024;
 }
 
 }  // namespace vcp

@@ -1,4 +1,4 @@
-// What is done with one bin of the finest level.
+// What is done with one bin of the finest level: by a whole build, and by a part of one (parts/build_parts.h).
 #pragma once
 
 #include <deque>
@@ -47,5 +47,8 @@ FileHeader headerOf(const LevelPlan& plan, const SoupMeasures& measures, bool ha
 
 /// Takes over what the header of a finished dataset says.
 void describe(const FileHeader& header, BuildFigures& figures);
+
+/// Returns the most memory that this process had so far.
+uint64_t peakRssBytes();
 
 }  // namespace vcp

@@ -1,6 +1,5 @@
 #include "builder/build.h"
 
-#include <sys/resource.h>
 #include <algorithm>
 #include <array>
 #include <memory>
@@ -15,6 +14,7 @@
 #include <oneapi/tbb/task_arena.h>
 
 #include "builder/bin_passes.h"
+#include "builder/build_until_dealt.h"
 #include "builder/checkpoint.h"
 #include "builder/dataset_assembly.h"
 #include "builder/deal.h"
@@ -34,16 +34,22 @@ namespace {
 // A level of slabs is built in runs of so many pages, with checkpoints between them.
 constexpr size_t kSlabPagesPerBin = 256;
 
+// A part of a build has about so many bins.
+constexpr unsigned kBinsOfPart = 4;
+
 // Shares of the whole time; what is left after reading, dealing and the vertices is shared by the levels.
 constexpr double kReadingShare = 0.08, kDealingShare = 0.04, kVerticesShare = 0.06, kWritingShare = 0.02;
 
 class Builder {
 public:
-    Builder(const BuildOptions& options, const MemoryPlan& plan, unsigned threads)
+    /// `parts`: how many parts will work on the bins; 0: it is a build of its own.
+    Builder(const BuildOptions& options, const MemoryPlan& plan, unsigned threads,
+            const std::filesystem::path& tempFolder, unsigned parts = 0)
         : options_(options),
+          parts_(parts),
           memory_(plan),
           meter_(options.progress),
-          space_(tempFolderOf(options), plan.tempBytes),
+          space_(tempFolder, plan.tempBytes),
           arena_(int(threads)) {
         // Without this TBB gives no more threads than processors, and warns about it.
         if (threads > tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism))
@@ -51,7 +57,7 @@ public:
     }
 
     Result<BuildReport> run() {
-        auto built = caught();
+        auto built = caught([this] { return stages(); });
         if (built) {
             space_.folder().remove();
             finishReport();
@@ -75,6 +81,18 @@ public:
         return error;
     }
 
+    /// Reads and deals, makes that durable and records it, with what each part will work on.
+    Result<void> runUntilDealt() {
+        return caught([this]() -> Result<void> {
+            VCP_TRY(read());
+            VCP_TRY(chooseGrid(0));
+            warnOfWideCells();
+            VCP_TRY(deal());
+            nlohmann::json fields{{"first bins", firstBinsOfParts()}, {"warnings", report_.warnings}};
+            return journal_.record(space_.folder(), fields);
+        });
+    }
+
 private:
     /// Whether the error is that a temporary file is damaged.
     bool isOfTempFiles(const Error& error) const {
@@ -82,9 +100,10 @@ private:
                std::filesystem::path(error.file).parent_path() == space_.folder().path();
     }
 
-    Result<void> caught() {
+    template <class Work>
+    Result<void> caught(const Work& work) {
         try {
-            return stages();
+            return work();
         } catch (const std::bad_alloc&) {
             return Error{
                 .code = ErrorCode::Limit,
@@ -103,7 +122,7 @@ private:
         else
             VCP_TRY(resumeMeasures());
         VCP_TRY(chooseGrid(done_.levelsLess));
-        if (auto warning = wideCellWarning(options_, measures_)) report_.warnings.push_back(std::move(*warning));
+        warnOfWideCells();
         if (stage.empty() || stage == "read")
             VCP_TRY(deal());
         else
@@ -115,8 +134,10 @@ private:
     // Progress and time
 
     bool progress(const std::string& stage, double fraction) {
-        return meter_.report(stage,
-                             {.fraction = fraction, .triangles = measures_.triangles, .tempBytes = space_.diskBytes()});
+        // What has parts ends with dealing.
+        const double whole = parts_ == 0 ? 1 : kReadingShare + kDealingShare;
+        return meter_.report(
+            stage, {.fraction = fraction / whole, .triangles = measures_.triangles, .tempBytes = space_.diskBytes()});
     }
 
     Error cancelled() const { return Error::cancelled(options_.output.string()); }
@@ -232,6 +253,10 @@ private:
         return {};
     }
 
+    void warnOfWideCells() {
+        if (auto warning = wideCellWarning(options_, measures_)) report_.warnings.push_back(std::move(*warning));
+    }
+
     Result<void> read() {
         if (!progress("reading", 0)) return cancelled();
         files_.soup = std::make_unique<Soup>(space_, memory_.bufferBytes);
@@ -282,10 +307,34 @@ private:
             VCP_TRY(chooseGrid(levelsLess_ + choice.levelsLess));
             VCP_TRY_ASSIGN(choice, choosePagesOnGrid());
         }
-        plan_.finest = PagePartition(choice.counts, memory_.binTriangles);
+        plan_.finest = PagePartition(choice.counts, binTriangles(choice));
         plan_.setPages(plan_.frame, std::move(choice.pages));
         finestPages_ = choice.counts.size();
         return planForPages();
+    }
+
+    /// Returns how many triangles a bin may have: parts need several bins each, to be equally large.
+    [[nodiscard]] uint64_t binTriangles(const PageChoice& choice) const {
+        if (parts_ == 0) return memory_.binTriangles;
+        uint64_t all = 0;
+        for (const auto& [page, count] : choice.counts) all += count;
+        return std::min(memory_.binTriangles, all / (uint64_t{kBinsOfPart} * parts_) + 1);
+    }
+
+    /// Returns the first bin of each part, and the number of bins: runs with about as many triangles each.
+    [[nodiscard]] std::vector<size_t> firstBinsOfParts() const {
+        const size_t bins = plan_.finest.bins();
+        const double total = double(files_.current->raw().total());
+        std::vector<size_t> first{0};
+        double before = 0;
+        for (size_t bin = 0; bin < bins; ++bin) {
+            const double count = double(files_.current->count(bin));
+            while (first.size() < parts_ && before + count / 2 > total * double(first.size()) / parts_)
+                first.push_back(bin);
+            before += count;
+        }
+        first.resize(size_t{parts_} + 1, bins);
+        return first;
     }
 
     Result<void> planForPages() {
@@ -302,7 +351,7 @@ private:
             .mostLevelsBelow = plan_.hasSlabs ? mostLevelsBelow(plan_.frame, measures_) : 0,
             .mayBeCoarser = plan_.hasSlabs && options_.cell <= 0,
             .marginCells = plan_.marginCells(),
-            .uncounted = memory_.binTriangles,
+            .uncounted = parts_ == 0 ? memory_.binTriangles : 0,
             .mostPages = memory_.mostCountedPages(),
             .progress = [&](double part) { return progress("sorting", kReadingShare + kDealingShare / 2 * part); }};
         auto choice = arena_.execute([&] { return choosePages(choosing); });
@@ -332,7 +381,7 @@ private:
         pass_ = plan_.levels();
         VCP_TRY(dealSoup());
         auto soup = std::move(files_.soup);
-        VCP_TRY(checkpoint("levels", 0, journal_.active()));
+        VCP_TRY(checkpoint("levels", 0, journal_.active() || parts_ > 0));
         soup->floats.raw().remove();
         soup->doubles.raw().remove();
         releaseMemory();
@@ -569,14 +618,13 @@ private:
     }
 
     void finishReport() {
-        rusage usage{};
-        getrusage(RUSAGE_SELF, &usage);
-        report_.peakRssBytes = uint64_t(usage.ru_maxrss) * 1024;
+        report_.peakRssBytes = peakRssBytes();
         report_.tempBytes = space_.peakDiskBytes();
         report_.seconds = meter_.seconds();
     }
 
     const BuildOptions& options_;
+    unsigned parts_;
     MemoryPlan memory_;
     ProgressMeter meter_;
     TempSpace space_;
@@ -607,20 +655,41 @@ std::filesystem::path tempFolderOf(const BuildOptions& options) {
     return (options.temp.empty() ? options.output.parent_path() : options.temp) / name;
 }
 
-Result<BuildReport> buildOctree(const BuildOptions& options) {
+namespace {
+
+/// Calls work(options, memory, threads), with what the options leave open.
+template <class Work>
+auto withPlan(const BuildOptions& options, const Work& work) -> decltype(work(options, MemoryPlan(), 1u)) {
     if (options.inputs.empty()) return Error{.code = ErrorCode::Usage, .message = "no input mesh given"};
-    const unsigned threads =
-        options.threads > 0 ? options.threads : unsigned(std::max(1, tbb::this_task_arena::max_concurrency()));
+    const unsigned threads = threadsOf(options);
     VCP_TRY_ASSIGN(auto plan,
                    planMemory(options.memoryBytes > 0 ? options.memoryBytes : defaultMemoryBytes(), threads));
     BuildOptions expanded = options;
     VCP_TRY_ASSIGN(auto inputs, expandInputs(options.inputs));
     expanded.inputs = std::move(inputs);
-    auto report = Builder(expanded, plan, threads).run();
-    if (report || !report.error().file.empty() || report.error().code == ErrorCode::Cancelled) return report;
-    Error error = report.error();
+    auto done = work(expanded, plan, threads);
+    if (done || !done.error().file.empty() || done.error().code == ErrorCode::Cancelled) return done;
+    Error error = done.error();
     error.file = options.inputs.front().string();
     return error;
+}
+
+}  // namespace
+
+unsigned threadsOf(const BuildOptions& options) {
+    return options.threads > 0 ? options.threads : unsigned(std::max(1, tbb::this_task_arena::max_concurrency()));
+}
+
+Result<BuildReport> buildOctree(const BuildOptions& options) {
+    return withPlan(options, [](const BuildOptions& all, const MemoryPlan& plan, unsigned threads) {
+        return Builder(all, plan, threads, tempFolderOf(all)).run();
+    });
+}
+
+Result<void> buildUntilDealt(const BuildOptions& options, const std::filesystem::path& folder, unsigned parts) {
+    return withPlan(options, [&](const BuildOptions& all, const MemoryPlan& plan, unsigned threads) {
+        return Builder(all, plan, threads, folder, parts).runUntilDealt();
+    });
 }
 
 }  // namespace vcp

@@ -29,8 +29,9 @@ bool isOfABuild(std::string_view name) {
     if (!name.ends_with(kTempSuffix)) return false;
     name.remove_suffix(std::string_view(kTempSuffix).size());
     name = name.substr(0, name.find_last_not_of("0123456789") + 1);
-    constexpr std::string_view kWords[] = {"floats", "doubles", "vertices", "waiting",      "level",         "normals",
-                                           "parts",  "pages",   "entries",  "surfacepages", "surfaceentries"};
+    constexpr std::string_view kWords[] = {"floats",  "doubles",      "vertices",      "waiting",     "level",
+                                           "normals", "parts",        "keptpages",     "keptentries", "pages",
+                                           "entries", "surfacepages", "surfaceentries"};
     return std::find(std::begin(kWords), std::end(kWords), name) != std::end(kWords);
 }
 
@@ -75,6 +76,10 @@ bool TempFolder::exists() const {
 Result<void> TempFolder::take() {
     const std::scoped_lock guard(mutex_);
     if (folder_ >= 0) return {};
+    if (use_ == FolderUse::Read) {
+        folder_ = ::open(path_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+        return folder_ >= 0 ? Result<void>() : systemError(path_, "cannot be opened", errno);
+    }
     for (;;) {
         Result<void> done = make();
         const Result<bool> held = done ? hold() : done.error();
@@ -162,7 +167,8 @@ Result<int> TempFolder::create(const std::string& name) const {
 
 Result<int> TempFolder::open(const std::string& name) const {
     // O_NONBLOCK keeps the open from waiting for a named pipe.
-    const int file = ::openat(folder_, name.c_str(), O_RDWR | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
+    const int access = use_ == FolderUse::Read ? O_RDONLY : O_RDWR;
+    const int file = ::openat(folder_, name.c_str(), access | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
     const int code = errno;
     if (file < 0 && code == ENOENT) return -1;
     constexpr const char* kForeign = "is not a file that a build made; move it away, and build again from the start";
@@ -180,7 +186,7 @@ void TempFolder::unlink(const std::string& name) const { ::unlinkat(folder_, nam
 Result<void> TempFolder::sync() const { return syncFolder(path_); }
 
 void TempFolder::clear(const std::vector<std::string>& kept) const {
-    if (folder_ < 0) return;
+    if (folder_ < 0 || use_ == FolderUse::Read) return;
     const auto isKept = [&](const std::string& name) {
         return std::find(kept.begin(), kept.end(), name) != kept.end();
     };
@@ -191,6 +197,7 @@ void TempFolder::clear(const std::vector<std::string>& kept) const {
 }
 
 void TempFolder::remove() {
+    if (use_ == FolderUse::Read) return;
     clear();
     const std::scoped_lock guard(mutex_);
     if (folder_ < 0) return;

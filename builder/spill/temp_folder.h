@@ -29,22 +29,29 @@ inline constexpr const char* kWhenTempIsFull = "free some space, or choose a tem
 /// Returns the error for bytes that differ from what was written: in `file`, at `byte`.
 Error damagedTempFile(const std::filesystem::path& file, std::optional<uint64_t> byte = {});
 
+/// Who uses a folder: the build that it belongs to, or one that only reads what another has finished; of these there
+/// may be any number at a time.
+enum class FolderUse { Own, Read };
+
 /// A folder for temporary files. Any thread.
 class TempFolder {
 public:
     /// Makes nothing yet.
-    explicit TempFolder(std::filesystem::path path) : path_(std::move(path)) {}
+    explicit TempFolder(std::filesystem::path path, FolderUse use = FolderUse::Own)
+        : path_(std::move(path)), use_(use) {}
     ~TempFolder();
     TempFolder(const TempFolder&) = delete;
     TempFolder& operator=(const TempFolder&) = delete;
 
     [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+    [[nodiscard]] FolderUse use() const { return use_; }
     /// Whether there is anything of that name, even a link to nothing.
     [[nodiscard]] bool exists() const;
 
     /// Makes the folder, and those that it lies in, or takes over that of an interrupted build or an empty one,
     /// durably, for this process until it is removed or this is destroyed. Nothing is left behind where that fails.
     /// Errors: Io (another build holds it; it is a link or a file; it has no mark and is not empty).
+    /// To read, the folder is opened as it is, and not locked. Errors: Io.
     Result<void> take();
     [[nodiscard]] bool isTaken() const { return folder_ >= 0; }
 
@@ -70,6 +77,7 @@ private:
     void unmake();
 
     std::filesystem::path path_;
+    FolderUse use_;
     std::vector<std::filesystem::path> made_;  ///< folders that were not there, the outermost first
     std::mutex mutex_;
     int folder_ = -1;

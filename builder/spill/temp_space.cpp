@@ -128,7 +128,8 @@ Result<void> TempFile::reopen(uint64_t bytes) {
         return Error{.code = ErrorCode::InvalidInput,
                      .message = "is shorter than the journal says; build again from the start",
                      .file = path().string()};
-    if (::ftruncate(file_, off_t(bytes)) != 0) return tempError(path(), "cannot be cut", errno);
+    const bool isCut = space_.folder().use() == FolderUse::Own;
+    if (isCut && ::ftruncate(file_, off_t(bytes)) != 0) return tempError(path(), "cannot be cut", errno);
     flushed_ = end_ = bytes;
     space_.addDisk(int64_t(bytes));
     return {};

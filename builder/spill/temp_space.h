@@ -29,8 +29,8 @@ class TempFile;
 class TempSpace {
 public:
     /// Nothing is created before it is needed. `memoryBytes`: what all files together may hold in memory.
-    TempSpace(std::filesystem::path folder, uint64_t memoryBytes)
-        : folder_(std::move(folder)), memoryBytes_(memoryBytes) {}
+    TempSpace(std::filesystem::path folder, uint64_t memoryBytes, FolderUse use = FolderUse::Own)
+        : folder_(std::move(folder), use), memoryBytes_(memoryBytes) {}
 
     /// The folder, held before files go there, and released with the space.
     [[nodiscard]] TempFolder& folder() { return folder_; }
@@ -74,8 +74,8 @@ public:
     Result<void> read(uint64_t offset, std::span<std::byte> bytes) const;
     /// Writes all bytes to the disk, durably. Errors: Io.
     Result<void> sync();
-    /// Takes over what an interrupted build left, cut to `bytes`, in the held folder. Errors: Io (not a file of a
-    /// build's own); InvalidInput (missing, shorter).
+    /// Takes over what an interrupted build left, cut to `bytes`, in the held folder; to read, nothing is cut. Errors:
+    /// Io (not a file of a build's own); InvalidInput (missing, shorter).
     Result<void> reopen(uint64_t bytes);
     /// Frees memory and disk.
     void remove();

@@ -25,6 +25,9 @@ const std::vector<Room>& rooms() {
         {"builder",
          {"octree/", "builder/stream", "builder/texture", "builder/mesh", "builder/spill", "builder/lattice",
           "builder/page", "builder/slab", "builder/level"}},
+        {"builder/parts",
+         {"octree/", "builder", "builder/stream", "builder/mesh", "builder/spill", "builder/lattice", "builder/page",
+          "builder/level"}},
         {"builder/paper", {"octree/", "builder", "builder/mesh", "builder/measure"}},
 
         {"mesostructure/gdm", {"octree/"}},

@@ -1,0 +1,155 @@
+#include "builder/parts/build_parts.h"
+
+#include <sys/stat.h>
+#include <cerrno>
+
+#include <fmt/format.h>
+#include <oneapi/tbb/global_control.h>
+#include <oneapi/tbb/task_arena.h>
+
+#include "builder/build_until_dealt.h"
+#include "builder/mesh/open_mesh.h"
+#include "builder/parts/part_steps.h"
+#include "octree/io/caught.h"
+#include "octree/io/durable_file.h"
+#include "octree/io/output_file.h"
+
+namespace vcp {
+
+namespace {
+
+Error usage(std::string message, const std::filesystem::path& file) {
+    return {.code = ErrorCode::Usage, .message = std::move(message), .file = file.string()};
+}
+
+Result<void> checkOptions(const BuildOptions& options, unsigned parts) {
+    if (parts == 0 || parts > kMostParts)
+        return usage(fmt::format("a build has 1 to {} parts", kMostParts), options.output);
+    if (options.error > 0 || options.coarseLeaves != CoarseLeaves::Slabs)
+        return usage(
+            "a build in parts has no tolerance and no coarser leaves of the mesh: their levels come one after "
+            "the other",
+            options.output);
+    for (const auto& input : options.inputs)
+        if (input == "-") return usage("standard input cannot be built in parts: machines read files", options.output);
+    return checkOutput(options.output, OutputKind::Dataset, {.overwrite = options.overwrite, .inputs = options.inputs});
+}
+
+/// Makes the folder of a plan; one that is there is left as it is.
+Result<void> makeFolder(const std::filesystem::path& folder) {
+    if (::mkdir(folder.c_str(), 0777) == 0) return {};
+    if (errno != EEXIST) return systemError(folder, "cannot be made", errno);
+    return usage("is there already: run its parts, or delete it to plan the build again", folder);
+}
+
+/// Names the part whose files are damaged or gone, where the error is of one.
+Error named(Error error, const std::filesystem::path& folder) {
+    const std::filesystem::path part = std::filesystem::path(error.file).parent_path();
+    const std::string name = part.filename().string();
+    const size_t dash = name.rfind('-');
+    if (error.code != ErrorCode::InvalidInput || part.parent_path() != folder || dash == std::string::npos)
+        return error;
+    error.message =
+        fmt::format("is damaged, cut off or lost: delete {} and run \"vcp build-step {} {} --plan {}\" again",
+                    part.string(), name.substr(0, dash), name.substr(dash + 1), folder.string());
+    return error;
+}
+
+Result<void> checkStep(const PartStep& step, const PartPlan& plan) {
+    VCP_TRY_ASSIGN(const auto program, programId());
+    if (program != plan.program)
+        return usage(fmt::format("was planned by another build of vcp ({}, this is {}): run that one, or plan again",
+                                 plan.program, program),
+                     step.folder / kPlanName);
+    for (const PartStage& stage : stagesOf(plan.parts)) {
+        if (stage.name != step.stage) continue;
+        if (step.number < stage.parts) return {};
+        return usage(fmt::format("stage {} has parts 0 to {}", stage.name, stage.parts - 1), step.folder);
+    }
+    return usage(fmt::format("there is no stage \"{}\"; they are deal, vertices, pages, merge", step.stage),
+                 step.folder);
+}
+
+Result<PartReport> run(const PartStep& step, const PartPlan& plan, const std::function<bool(double)>& progress) {
+    PartReport report;
+    const PartName name{step.folder, step.stage, step.number};
+    NewPart made(name);
+    if (step.stage == "deal") {
+        VCP_TRY(checkInputs(plan));
+        VCP_TRY(buildUntilDealt(plan.options, made.folder(), plan.parts));
+        VCP_TRY(made.rename());
+        return report;
+    }
+    VCP_TRY_ASSIGN(auto context, openContext(step.folder, plan));
+    context.progress = &progress;
+    std::optional<oneapi::tbb::global_control> more;
+    using Control = oneapi::tbb::global_control;
+    if (context.threads > Control::active_value(Control::max_allowed_parallelism))
+        more.emplace(Control::max_allowed_parallelism, context.threads);
+    oneapi::tbb::task_arena arena{int(context.threads)};
+    Result<void> done;
+    arena.execute([&] {
+        if (step.stage == "vertices") {
+            done = runVertices(context, step.number, made);
+        } else if (step.stage == "pages") {
+            done = runPages(context, step.number, made);
+        } else {
+            auto figures = runMerge(context, made);
+            if (figures) report.dataset = *figures;
+            if (!figures) done = figures.error();
+        }
+    });
+    VCP_TRY(done);
+    if (report.dataset) report.warnings = context.dealt.fields.at("warnings").get<std::vector<std::string>>();
+    return report;
+}
+
+}  // namespace
+
+std::vector<PartStage> stagesOf(unsigned parts) {
+    return {{"deal", 1}, {"vertices", parts}, {"pages", parts}, {"merge", 1}};
+}
+
+Result<std::filesystem::path> planParts(const BuildOptions& options, unsigned parts) {
+    VCP_TRY(checkOptions(options, parts));
+    PartPlan plan{.options = options, .parts = parts, .program = {}, .inputs = {}};
+    VCP_TRY_ASSIGN(auto inputs, expandInputs(options.inputs));
+    for (auto& input : inputs) input = std::filesystem::absolute(input);
+    plan.options.output = std::filesystem::absolute(options.output);
+    VCP_TRY_ASSIGN(plan.program, programId());
+    VCP_TRY_ASSIGN(plan.inputs, describeInputs(inputs));
+    std::filesystem::path name = plan.options.output.filename();
+    name += ".parts";
+    const std::filesystem::path folder =
+        (options.temp.empty() ? plan.options.output.parent_path() : std::filesystem::absolute(options.temp)) / name;
+    VCP_TRY(makeFolder(folder));
+    const auto written = writePlan(plan, folder);
+    if (!written) ::rmdir(folder.c_str());
+    VCP_TRY(written);
+    return folder;
+}
+
+Result<PartReport> runPart(const PartStep& given) {
+    PartStep step = given;
+    step.folder = std::filesystem::absolute(given.folder).lexically_normal();
+    if (!step.folder.has_filename()) step.folder = step.folder.parent_path();
+    VCP_TRY_ASSIGN(auto plan, readPlan(step.folder));
+    VCP_TRY(checkStep(step, plan));
+    if (isDone({step.folder, step.stage, step.number})) return PartReport{.wasDone = true};
+    if (step.threads > 0) plan.options.threads = step.threads;
+    if (step.memoryBytes > 0) plan.options.memoryBytes = step.memoryBytes;
+    plan.options.progress = step.progress;
+    ProgressMeter meter(step.progress);
+    const std::function<bool(double)> progress = [&](double part) {
+        return meter.report(step.stage, {.fraction = part});
+    };
+    auto report = caught([&] { return run(step, plan, progress); }, step.folder.string());
+    if (!report) return named(report.error(), step.folder);
+    if (report->dataset) {
+        report->dataset->seconds = meter.seconds();
+        report->dataset->peakRssBytes = peakRssBytes();
+    }
+    return report;
+}
+
+}  // namespace vcp

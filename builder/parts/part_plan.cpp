@@ -1,0 +1,128 @@
+#include "builder/parts/part_plan.h"
+
+#include <fcntl.h>
+#include <unistd.h>
+#include <cerrno>
+#include <fstream>
+#include <memory>
+
+#include <fmt/format.h>
+#include <xxhash.h>
+#include <nlohmann/json.hpp>
+
+#include "builder/stream/side_file.h"
+#include "octree/io/durable_file.h"
+#include "octree/io/file_descriptor.h"
+#include "octree/io/output_file.h"
+#include "octree/vcp_file.h"
+
+namespace vcp {
+
+namespace {
+
+using nlohmann::json;
+
+Result<uint64_t> hashOfFile(const std::filesystem::path& path) {
+    const FileDescriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
+    if (!file.isOpen()) return systemError(path, "cannot be opened", errno);
+    const std::unique_ptr<XXH3_state_t, decltype(&XXH3_freeState)> state(XXH3_createState(), &XXH3_freeState);
+    XXH3_64bits_reset(state.get());
+    std::vector<char> piece(size_t{1} << 20);
+    for (;;) {
+        const ssize_t n = ::read(file.number(), piece.data(), piece.size());
+        if (n == 0) return XXH3_64bits_digest(state.get());
+        if (n < 0 && errno == EINTR) continue;
+        if (n < 0) return systemError(path, "cannot be read", errno);
+        XXH3_64bits_update(state.get(), piece.data(), size_t(n));
+    }
+}
+
+Error damagedPlan(const std::filesystem::path& file) {
+    return {
+        .code = ErrorCode::InvalidInput, .message = "is not a whole plan; plan the build again", .file = file.string()};
+}
+
+json jsonOf(const PartPlan& plan) {
+    const BuildOptions& o = plan.options;
+    json inputs = json::array();
+    for (const PlannedInput& each : plan.inputs)
+        inputs.push_back({{"path", each.path.string()}, {"stamp", each.stamp}, {"hash", each.hash}});
+    return {{"program", plan.program},  {"parts", plan.parts}, {"inputs", inputs}, {"output", o.output.string()},
+            {"overwrite", o.overwrite}, {"format", o.format},  {"cell", o.cell},   {"colour", int(o.colour)},
+            {"memory", o.memoryBytes}};
+}
+
+PartPlan planFrom(const json& j) {
+    PartPlan plan;
+    plan.program = j.at("program").get<std::string>();
+    plan.parts = j.at("parts").get<unsigned>();
+    for (const json& each : j.at("inputs")) {
+        plan.inputs.push_back(
+            {each.at("path").get<std::string>(), each.at("stamp").get<std::string>(), each.at("hash").get<uint64_t>()});
+        plan.options.inputs.push_back(plan.inputs.back().path);
+    }
+    plan.options.output = j.at("output").get<std::string>();
+    plan.options.overwrite = j.at("overwrite").get<bool>();
+    plan.options.format = j.at("format").get<std::string>();
+    plan.options.cell = j.at("cell").get<double>();
+    plan.options.colour = ColourChoice(j.at("colour").get<int>());
+    plan.options.memoryBytes = j.at("memory").get<uint64_t>();
+    return plan;
+}
+
+}  // namespace
+
+Result<std::string> programId() {
+    VCP_TRY_ASSIGN(const auto hash, hashOfFile("/proc/self/exe"));
+    return fmt::format("{} {:016x}", VCP_VERSION, hash);
+}
+
+Result<std::vector<PlannedInput>> describeInputs(const std::vector<std::filesystem::path>& paths) {
+    std::vector<PlannedInput> inputs;
+    for (const auto& path : paths) {
+        const std::string stamp = fileStamp(path);
+        VCP_TRY_ASSIGN(const auto hash, hashOfFile(path));
+        inputs.push_back({path, stamp, hash});
+    }
+    return inputs;
+}
+
+Result<void> checkInputs(const PartPlan& plan) {
+    for (const PlannedInput& each : plan.inputs) {
+        // A copy, or another machine's clock, changes the times alone: then the bytes decide.
+        if (fileStamp(each.path) == each.stamp) continue;
+        VCP_TRY_ASSIGN(const auto hash, hashOfFile(each.path));
+        if (hash != each.hash)
+            return Error{.code = ErrorCode::Usage,
+                         .message = "was changed since the build was planned; plan it again",
+                         .file = each.path.string()};
+    }
+    return {};
+}
+
+Result<void> writePlan(const PartPlan& plan, const std::filesystem::path& folder) {
+    std::string text;
+    try {
+        text = jsonOf(plan).dump(2) + "\n";
+    } catch (const json::exception&) {
+        return Error{.code = ErrorCode::Usage,
+                     .message = "the names of inputs and output must be UTF-8 to be planned in parts",
+                     .file = plan.options.output.string()};
+    }
+    return writeFile(folder / kPlanName, OutputKind::JsonText, text);
+}
+
+Result<PartPlan> readPlan(const std::filesystem::path& folder) {
+    const std::filesystem::path file = folder / kPlanName;
+    std::ifstream stream(file);
+    if (!stream) return systemError(file, "cannot be opened", errno);
+    try {
+        PartPlan plan = planFrom(json::parse(stream));
+        if (plan.parts == 0 || plan.inputs.empty()) return damagedPlan(file);
+        return plan;
+    } catch (const json::exception&) {
+        return damagedPlan(file);
+    }
+}
+
+}  // namespace vcp

@@ -1,0 +1,208 @@
+// Builds in parts: the bytes of a whole build, whatever the order; parts that are lost, cut off, killed or foreign.
+#include "builder/parts/build_parts.h"
+
+#include <algorithm>
+#include <fstream>
+#include <random>
+#include <thread>
+
+#include <gtest/gtest.h>
+
+#include "tests/support/mesh_files.h"
+#include "tests/support/test_folder.h"
+#include "tests/support/test_meshes.h"
+
+namespace vcp {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string bytesOf(const fs::path& path) {
+    std::ifstream in(path, std::ios::binary);
+    return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+}
+
+/// Triangles across many bins, an open part and a closed one, coordinates far from zero.
+IndexedMesh mixedMesh() {
+    IndexedMesh mesh = test::randomTriangles(200, 5, true);
+    for (glm::dvec3& p : mesh.positions) p = p * 60.0 + 2.0;
+    test::append(mesh, test::torusMesh({31, 33, 30}, 20, 6, 240, 120));
+    test::append(mesh, test::sphereMesh({20, 20, 20}, 9, 60));
+    mesh.triangles.pop_back();
+    for (glm::dvec3& p : mesh.positions) p += glm::dvec3(500000, 4000000, 1000);
+    return mesh;
+}
+
+class BuildParts : public ::testing::Test {
+protected:
+    void SetUp() override {
+        const IndexedMesh mesh = mixedMesh();
+        std::mt19937 random{7};
+        std::vector<uint32_t> colours(mesh.positions.size());
+        for (uint32_t& colour : colours) colour = uint32_t(random());
+        test::writePly(mesh, input(), colours);
+        const auto built = buildOctree(options());
+        ASSERT_TRUE(built.ok()) << built.error().line();
+        whole_ = bytesOf(output());
+        fs::remove(output());
+    }
+
+    fs::path input() const { return folder_ / "mesh.ply"; }
+    fs::path output() const { return folder_ / "out.vcp"; }
+    fs::path plan() const { return folder_ / "out.vcp.parts"; }
+    BuildOptions options() const {
+        BuildOptions o;
+        o.inputs = {input()};
+        o.output = output();
+        o.threads = 2;
+        return o;
+    }
+
+    Result<PartReport> run(const std::string& stage, unsigned number) const {
+        return runPart({.folder = plan(), .stage = stage, .number = number, .threads = 2});
+    }
+    void runAll(const std::string& stage, unsigned parts, uint64_t seed = 0) const {
+        std::vector<unsigned> order(parts);
+        for (unsigned i = 0; i < parts; ++i) order[i] = i;
+        std::shuffle(order.begin(), order.end(), std::mt19937_64(seed));
+        for (const unsigned i : order) {
+            const auto done = run(stage, i);
+            ASSERT_TRUE(done.ok()) << stage << " " << i << ": " << done.error().line();
+        }
+    }
+    void planned(unsigned parts) const {
+        const auto folder = planParts(options(), parts);
+        ASSERT_TRUE(folder.ok()) << folder.error().line();
+        ASSERT_EQ(*folder, plan());
+    }
+    void expectRefused(const Result<PartReport>& done, ErrorCode code, const std::string& said) const {
+        ASSERT_FALSE(done.ok());
+        EXPECT_EQ(done.error().code, code) << done.error().line();
+        EXPECT_NE(done.error().line().find(said), std::string::npos) << done.error().line();
+        EXPECT_EQ(done.error().line().find('\n'), std::string::npos);
+        for (const auto& each : fs::directory_iterator(plan()))
+            EXPECT_EQ(each.path().string().find(".partial"), std::string::npos) << each.path();
+    }
+
+    TestFolder folder_{"vcp_build_parts_test"};
+    std::string whole_;
+};
+
+TEST_F(BuildParts, AreTheBytesOfTheWhole) {
+    for (const unsigned parts : {1u, 3u, 8u}) {
+        planned(parts);
+        for (const PartStage& stage : stagesOf(parts)) ASSERT_NO_FATAL_FAILURE(runAll(stage.name, stage.parts, parts));
+        EXPECT_EQ(bytesOf(output()), whole_) << parts << " parts";
+        size_t files = 0;
+        for (const auto& each : fs::recursive_directory_iterator(plan())) files += each.is_regular_file() ? 1 : 0;
+        // The plan; of a part mark, journal and three files, or of each of at most 16 levels four.
+        EXPECT_LE(files, 1 + (1 + parts) * 5 + parts * (2 + 16 * 4));
+        fs::remove_all(plan());
+        fs::remove(output());
+    }
+}
+
+TEST_F(BuildParts, TwoCopiesOfAPartAtOnce) {
+    planned(2);
+    for (const PartStage& stage : stagesOf(2))
+        for (unsigned i = 0; i < stage.parts; ++i) {
+            Result<PartReport> other = PartReport{};
+            std::thread copy([&] { other = run(stage.name, i); });
+            const auto one = run(stage.name, i);
+            copy.join();
+            EXPECT_TRUE(one.ok()) << one.error().line();
+            EXPECT_TRUE(other.ok()) << other.error().line();
+        }
+    EXPECT_EQ(bytesOf(output()), whole_);
+}
+
+TEST_F(BuildParts, APartThatIsDoneIsNotRunAgain) {
+    planned(2);
+    ASSERT_NO_FATAL_FAILURE(runAll("deal", 1));
+    const auto again = run("deal", 0);
+    ASSERT_TRUE(again.ok());
+    EXPECT_TRUE(again->wasDone);
+}
+
+TEST_F(BuildParts, MissingPartsAreNamed) {
+    planned(2);
+    expectRefused(run("vertices", 0), ErrorCode::Usage, "deal 0");
+    ASSERT_NO_FATAL_FAILURE(runAll("deal", 1));
+    ASSERT_TRUE(run("vertices", 0).ok());
+    expectRefused(run("pages", 0), ErrorCode::Usage, "vertices 1");
+    ASSERT_TRUE(run("vertices", 1).ok());
+    ASSERT_TRUE(run("pages", 1).ok());
+    expectRefused(run("merge", 0), ErrorCode::Usage, "pages 0");
+    EXPECT_FALSE(fs::exists(output()));
+    expectRefused(run("pages", 2), ErrorCode::Usage, "parts 0 to 1");
+    expectRefused(run("paint", 0), ErrorCode::Usage, "paint");
+}
+
+TEST_F(BuildParts, CutOffAndLostFilesNameTheirPart) {
+    planned(3);
+    for (const char* stage : {"deal", "vertices", "pages"})
+        ASSERT_NO_FATAL_FAILURE(runAll(stage, std::string(stage) == "deal" ? 1 : 3));
+    size_t tried = 0;
+    for (const auto& each : fs::directory_iterator(plan() / "pages-1")) {
+        const fs::path file = each.path();
+        const auto size = fs::file_size(file);
+        if (size == 0) continue;
+        const std::string content = bytesOf(file);
+        // A journal's line is whole without its end.
+        const bool isJournal = file.filename() == "journal";
+        fs::resize_file(file, isJournal ? size / 2 : size - 1);
+        expectRefused(run("merge", 0), ErrorCode::InvalidInput, "pages 1");
+        fs::remove(file);
+        expectRefused(run("merge", 0), isJournal ? ErrorCode::Usage : ErrorCode::InvalidInput, "pages 1");
+        std::ofstream(file, std::ios::binary) << content;
+        ++tried;
+    }
+    EXPECT_GE(tried, 3u);
+    fs::remove_all(plan() / "pages-1");
+    expectRefused(run("merge", 0), ErrorCode::Usage, "pages 1");
+    ASSERT_TRUE(run("pages", 1).ok());
+    ASSERT_TRUE(run("merge", 0).ok());
+    EXPECT_EQ(bytesOf(output()), whole_);
+}
+
+TEST_F(BuildParts, AnotherProgramIsRefused) {
+    planned(2);
+    std::string text = bytesOf(plan() / "plan.json");
+    const size_t at = text.find("\"program\": \"") + 12;
+    text[at] = text[at] == '9' ? '8' : '9';
+    std::ofstream(plan() / "plan.json", std::ios::binary) << text;
+    expectRefused(run("deal", 0), ErrorCode::Usage, "another build of vcp");
+    std::ofstream(plan() / "plan.json", std::ios::binary) << text.substr(0, text.size() / 2);
+    expectRefused(run("deal", 0), ErrorCode::InvalidInput, "not a whole plan");
+}
+
+TEST_F(BuildParts, ChangedInputsAreRefusedAndTouchedOnesAreNot) {
+    planned(1);
+    fs::last_write_time(input(), fs::file_time_type::clock::now() + std::chrono::hours(1000));
+    std::string content = bytesOf(input());
+    content[content.size() / 2] ^= 1;
+    const std::string before = bytesOf(input());
+    std::ofstream(input(), std::ios::binary) << content;
+    expectRefused(run("deal", 0), ErrorCode::Usage, "was changed since");
+    std::ofstream(input(), std::ios::binary) << before;
+    EXPECT_TRUE(run("deal", 0).ok());
+}
+
+TEST_F(BuildParts, WhatCannotBePlanned) {
+    BuildOptions o = options();
+    o.error = 0.1;
+    EXPECT_FALSE(planParts(o, 2).ok());
+    o = options();
+    o.inputs = {"-"};
+    EXPECT_FALSE(planParts(o, 2).ok());
+    EXPECT_FALSE(planParts(options(), 0).ok());
+    EXPECT_FALSE(planParts(options(), kMostParts + 1).ok());
+    EXPECT_FALSE(fs::exists(plan()));
+    planned(2);
+    const auto again = planParts(options(), 2);
+    ASSERT_FALSE(again.ok());
+    EXPECT_NE(again.error().message.find("already"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace vcp
