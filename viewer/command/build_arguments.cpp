@@ -49,10 +49,7 @@ void addBuildSettings(CLI::App& app, BuildOptions& options, const char* group) {
     const ScopedGroup scope(app, group);
     addCell(app, options.cell);
     addError(app, options);
-    addParsed(app, "--colour,--color", options.colour, colourNamed, "auto, vertex, texture or none",
-              "Colour to keep: auto (all there is), vertex, texture or none")
-        ->type_name("WHICH:{auto,vertex,texture,none}")
-        ->default_str("auto");
+    addColourChoice(app, options);
     addParsed(app, "--leaves", options.coarseLeaves, leavesNamed, "slabs or mesh",
               "What coarser levels are made of: slabs (one plane a cell) or mesh (triangles of clustered vertices, and "
               "vectors at corners where they suffice; always with --error)")
@@ -62,15 +59,51 @@ void addBuildSettings(CLI::App& app, BuildOptions& options, const char* group) {
     app.add_option("--threads", options.threads, "Threads that build [one a processor]")
         ->type_name("N")
         ->check(CLI::Range(1, 1024));
+    addFormat(app, options);
+    addMemory(app, options.memoryBytes, "Memory that the build may take: 512M, 4G, 50% [half of the machine's]");
+    addTempFolder(app, options, "Folder for temporary files [that of the output]");
+}
+
+void addBuildInputs(CLI::App& app, std::vector<std::string>& inputs, const std::string& description) {
+    app.add_option("IN", inputs, description)->type_name("")->required();
+}
+
+void addBuildOutput(CLI::App& app, std::string& output) {
+    app.add_option("-o,--output", output, "The .vcp file to write")
+        ->type_name("OUT.vcp")
+        ->group(help_group::kOutput)
+        ->check([](const std::string& name) { return extensionProblem(name, ".vcp", false); });
+}
+
+void addColourChoice(CLI::App& app, BuildOptions& options) {
+    addParsed(app, "--colour,--color", options.colour, colourNamed, "auto, vertex, texture or none",
+              "Colour to keep: auto (all there is), vertex, texture or none")
+        ->type_name("WHICH:{auto,vertex,texture,none}")
+        ->default_str("auto");
+}
+
+void addFormat(CLI::App& app, BuildOptions& options) {
     app.add_option("--format", options.format,
                    fmt::format("Format of meshes whose content does not tell it: {}", fmt::join(meshFormats(), ", ")))
         ->type_name("NAME")
         ->check(CLI::IsMember(std::vector<std::string>(meshFormats().begin(), meshFormats().end()), CLI::ignore_case));
-    addMemory(app, options.memoryBytes, "Memory that the build may take: 512M, 4G, 50% [half of the machine's]");
+}
+
+void addTempFolder(CLI::App& app, BuildOptions& options, const std::string& description) {
     const auto folder = [](const std::string& name) { return std::optional(std::filesystem::path(name)); };
-    addParsed(app, "--temp", options.temp, folder, "a folder", "Folder for temporary files [that of the output]")
+    addParsed(app, "--temp", options.temp, folder, "a folder", description)
         ->type_name("DIR")
         ->check(CLI::ExistingDirectory);
+}
+
+Json toJson(const BuildFigures& figures) {
+    return {{"triangles", figures.triangles},         {"degenerate_triangles", figures.degenerateTriangles},
+            {"vertices", figures.vertices},           {"seconds", figures.seconds},
+            {"peak_rss_bytes", figures.peakRssBytes}, {"temp_bytes", figures.tempBytes},
+            {"file_bytes", figures.fileBytes},        {"levels", figures.levels},
+            {"subvolumes", figures.subvolumes},       {"leaves", figures.leaves},
+            {"hard_leaves", figures.hardLeaves},      {"cell", figures.cell},
+            {"error_target", figures.errorTarget},    {"certified_error_max", figures.certifiedErrorMax}};
 }
 
 ProgressDetails detailsOf(const BuildProgress& at) { return {.triangles = at.triangles, .tempBytes = at.tempBytes}; }

@@ -15,6 +15,16 @@ namespace vcp {
 /// Adds what a person may say of a build, beside its inputs and output, to a group of help_text.h.
 void addBuildSettings(CLI::App& app, BuildOptions& options, const char* group);
 
+/// Add one of them, or the meshes and the .vcp file, for commands that have not all.
+void addBuildInputs(CLI::App& app, std::vector<std::string>& inputs, const std::string& description);
+void addBuildOutput(CLI::App& app, std::string& output);
+void addColourChoice(CLI::App& app, BuildOptions& options);
+void addFormat(CLI::App& app, BuildOptions& options);
+void addTempFolder(CLI::App& app, BuildOptions& options, const std::string& description);
+
+/// Returns the fields of a build's figures (--json).
+Json toJson(const BuildFigures& figures);
+
 /// Returns what a display shows of a build.
 ProgressDetails detailsOf(const BuildProgress& at);
 

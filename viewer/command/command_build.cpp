@@ -33,24 +33,6 @@ struct BuildCommand {
     ReportOptions report;
 };
 
-Json toJson(const BuildReport& report) {
-    return {{"triangles", report.triangles},
-            {"degenerate_triangles", report.degenerateTriangles},
-            {"vertices", report.vertices},
-            {"seconds", report.seconds},
-            {"peak_rss_bytes", report.peakRssBytes},
-            {"temp_bytes", report.tempBytes},
-            {"file_bytes", report.fileBytes},
-            {"levels", report.levels},
-            {"subvolumes", report.subvolumes},
-            {"leaves", report.leaves},
-            {"hard_leaves", report.hardLeaves},
-            {"cell", report.cell},
-            {"error_target", report.errorTarget},
-            {"certified_error_max", report.certifiedErrorMax},
-            {"warnings", report.warnings}};
-}
-
 std::string summary(const std::string& output, const BuildReport& report) {
     const double triangles = double(std::max<uint64_t>(report.triangles, 1));
     std::string text = fmt::format("{}: {} triangles in {} ({:.2f} M/s), peak memory {}\n", output,
@@ -155,10 +137,13 @@ Result<int> run(const BuildCommand& command) {
     const auto report = command.isPaper() ? buildPaperFile(options, command.paper) : buildOctree(options);
     display.finish();
     if (!report) return report.error();
-    if (command.report.json)
-        VCP_TRY(printJson(toJson(*report)));
-    else
+    if (command.report.json) {
+        Json json = toJson(*report);
+        json["warnings"] = report->warnings;
+        VCP_TRY(printJson(json));
+    } else {
         VCP_TRY(printLine(summary(command.output, *report)));
+    }
     return 0;
 }
 
@@ -167,15 +152,11 @@ Result<int> run(const BuildCommand& command) {
 Command addBuild(CLI::App& vcp) {
     auto command = std::make_shared<BuildCommand>();
     CLI::App* app = vcp.add_subcommand("build", "Build meshes into a .vcp file");
-    app->add_option("IN", command->inputs,
-                    "Meshes: PLY, OBJ, STL, OFF, glTF, GLB, Draco, also as .gz or .zst; several are joined, a folder "
-                    "stands for those in it, - for standard input")
-        ->type_name("")
-        ->required();
+    addBuildInputs(*app, command->inputs,
+                   "Meshes: PLY, OBJ, STL, OFF, glTF, GLB, Draco, also as .gz or .zst; several are joined, a folder "
+                   "stands for those in it, - for standard input");
     beginGroup(*app, help_group::kOutput);
-    app->add_option("-o,--output", command->output, "The .vcp file to write")
-        ->type_name("OUT.vcp")
-        ->check([](const std::string& name) { return extensionProblem(name, ".vcp", false); });
+    addBuildOutput(*app, command->output);
     addOverwriteOption(*app, command->overwrite);
     app->add_flag("--resume", command->resume, "Go on where an interrupted build of the same output was");
     app->add_option("--checkpoint", command->checkpointSeconds,
