@@ -1,8 +1,8 @@
 #include "render/false_colours.h"
 
 #include "render/host/hit_light.h"
-#include "render/meso_view.h"
 #include "render/shared/frame.h"
+#include "render/shared/meso_view.h"
 
 namespace vcp {
 

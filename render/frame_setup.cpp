@@ -204,6 +204,20 @@ glm::dvec2 upperLeft(const FrameRequest& request) {
     return glm::dvec2(tile.x, tile.y) + sampleOffset(request.sample);
 }
 
+PictureRays pictureRays(const FrameRequest& request) {
+    const PictureTile whole = wholePicture(request);
+    PictureRays rays = pictureRays(request.camera, whole.fullWidth, whole.fullHeight);
+    const glm::dvec2 corner = upperLeft(request);
+    rays.origin = rays.originAt(corner.x, corner.y);
+    rays.direction = rays.directionAt(corner.x, corner.y);
+    rays.size = {int(request.width), int(request.height)};
+    for (const SectionPlane& plane : request.sections) {
+        const double length = glm::length(plane.normal);
+        rays.sections.emplace_back(plane.normal / length, plane.offset / length);
+    }
+    return rays;
+}
+
 PixelHit pixelHit(const FrameRequest& request, PicturePixel pixel, double depth, glm::vec3 normal) {
     const PictureTile whole = wholePicture(request);
     const glm::dvec2 at = upperLeft(request) + glm::dvec2(pixel.x, pixel.y) + 0.5;

@@ -40,6 +40,9 @@ PictureTile wholePicture(const FrameRequest& request);
 /// tile begins, moved by the request's sample.
 glm::dvec2 upperLeft(const FrameRequest& request);
 
+/// Returns the rays of the part of a picture that a request draws, with its section planes.
+PictureRays pictureRays(const FrameRequest& request);
+
 /// Returns what a pixel shows: a hit in depth `depth` (world units from the ray's origin), with a unit normal.
 PixelHit pixelHit(const FrameRequest& request, PicturePixel pixel, double depth, glm::vec3 normal);
 

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <map>
 #include <optional>
+#include <tuple>
 
 #include <fmt/format.h>
 
@@ -19,21 +21,6 @@ namespace {
 Error unsupported(const char* what) {
     return {.code = ErrorCode::Unsupported,
             .message = fmt::format("the host does not draw {}; take a Vulkan device", what)};
-}
-
-/// Returns the rays of the part of a picture that a request draws.
-PictureRays raysOf(const FrameRequest& request) {
-    const PictureTile whole = wholePicture(request);
-    PictureRays rays = pictureRays(request.camera, whole.fullWidth, whole.fullHeight);
-    const glm::dvec2 corner = upperLeft(request);
-    rays.origin = rays.originAt(corner.x, corner.y);
-    rays.direction = rays.directionAt(corner.x, corner.y);
-    rays.size = {int(request.width), int(request.height)};
-    for (const SectionPlane& plane : request.sections) {
-        const double length = glm::length(plane.normal);
-        rays.sections.emplace_back(plane.normal / length, plane.offset / length);
-    }
-    return rays;
 }
 
 /// The pages of a cut, as rays are cast through them; the views that the scene points to.
@@ -131,7 +118,7 @@ HostLayer layerOf(PlacedLayer& placed, const FrameRequest& request) {
     const Dataset& dataset = drawn.residency.dataset();
     const bool hasColour = drawn.residency.hasColour();
     return {.scene = *placed.scene,
-            .rays = raysOf(placed.seen),
+            .rays = pictureRays(placed.seen),
             .frame = frameConstants(placed.seen, &dataset, 1, hasColour, drawn.errorPixels, drawn.placement),
             .hasColour = hasColour,
             .caps = capsOf(request, dataset),
@@ -140,20 +127,28 @@ HostLayer layerOf(PlacedLayer& placed, const FrameRequest& request) {
             .marks = placed.marks ? &*placed.marks : nullptr};
 }
 
-/// Draws layers; where they shade each other, all at once.
-Result<void> drawLayers(std::span<HostLayer> layers, std::span<const HostDataset> datasets, const FrameRequest& request,
+/// Returns how far occlusion reaches where nothing else is asked for; world units.
+double occlusionReach(std::span<const HostDataset> datasets, std::span<const HostSurface> surfaces) {
+    std::vector<PictureDataset> all;
+    for (const HostDataset& each : datasets) all.push_back({each.residency.dataset(), each.placement});
+    std::vector<WorldBox> boxes;
+    for (const HostSurface& each : surfaces) boxes.push_back({each.shell.low, each.shell.high});
+    return occlusionRadiusAmong(all, boxes);
+}
+
+/// Draws layers and surfaces; where they shade each other, all at once.
+Result<void> drawLayers(std::span<const HostLayer> layers, std::span<const HostSurface> surfaces,
+                        std::span<const HostDataset> datasets, const FrameRequest& request,
                         const HostCastOptions& options, HostPicture& picture) {
-    if (layers.size() < 2 || !hasLight(request.shading)) {
-        for (const HostLayer& layer : layers) VCP_TRY(drawLayer(layer, options, picture));
-        return {};
-    }
-    if (request.shading.occlusionRadius <= 0) {
-        std::vector<PictureDataset> all;
-        for (const HostDataset& each : datasets) all.push_back({each.residency.dataset(), each.placement});
-        const double radius = occlusionRadiusAmong(all);
-        for (HostLayer& layer : layers) layer.frame.occlusionReach = float(radius / double(layer.frame.worldPerCell));
-    }
-    return drawLitLayers(layers, options, picture);
+    LitScene scene{layers, surfaces, frameConstants(request, nullptr, 1, false, 0), 0};
+    const double asked = request.shading.occlusionRadius;
+    scene.occlusionReach = float(asked > 0 ? asked : occlusionReach(datasets, surfaces));
+    scene.frame.hasShadows = hasMesoShadows(request.shading) ? 1 : 0;
+    if (hasLight(request.shading) && layers.size() + surfaces.size() > 1) return drawLitScene(scene, options, picture);
+    for (const HostLayer& layer : layers) VCP_TRY(drawLayer(layer, options, picture));
+    if (surfaces.empty()) return {};
+    scene.layers = {};
+    return drawLitScene(scene, options, picture);
 }
 
 /// Tells the residencies what the rays of a first sample hit.
@@ -199,8 +194,36 @@ Result<void> checkHostDraws(const FrameRequest& request) {
     return {};
 }
 
-Result<HostPicture> drawOnHost(std::span<const HostDataset> datasets, const FrameRequest& request,
-                               const std::function<bool()>& cancel) {
+Result<std::vector<PreparedSurface>> prepareOnHost(std::span<const MesoSurface> surfaces) {
+    using Words = std::shared_ptr<const std::vector<uint64_t>>;
+    std::map<std::tuple<const meso::Appearance*, const MesoTexture*, const MesoTexture*>, Words> known;
+    std::vector<PreparedSurface> prepared;
+    for (const MesoSurface& surface : surfaces) {
+        if (!surface.arrays) return unsupported("remeshed surfaces");
+        MesoLook look = mesoLook(surface);
+        Words& words = known[{surface.far.get(), surface.colours.get(), surface.normals.get()}];
+        if (!words) words = std::make_shared<const std::vector<uint64_t>>(std::move(look.looks));
+        look.looks.clear();
+        prepared.push_back({&surface, std::move(look), words});
+    }
+    return prepared;
+}
+
+uint64_t bytesOf(std::span<const PreparedSurface> surfaces) {
+    std::map<const void*, uint64_t> bytes;
+    for (const PreparedSurface& each : surfaces) {
+        const MesoSurface& surface = *each.surface;
+        bytes[surface.arrays.get()] = surface.arrays->words.size() * sizeof(uint32_t);
+        bytes[&surface.shell] = surface.shell.texels.size() * sizeof(glm::vec4);
+        bytes[each.words.get()] = each.words->size() * sizeof(uint64_t);
+    }
+    uint64_t sum = 0;
+    for (const auto& [what, count] : bytes) sum += count;
+    return sum;
+}
+
+Result<HostPicture> drawOnHost(std::span<const HostDataset> datasets, std::span<const PreparedSurface> surfaces,
+                               const FrameRequest& request, const std::function<bool()>& cancel) {
     const HostCastOptions options{.cancel = cancel};
     HostPicture picture({int(request.width), int(request.height)}, backgroundRows(request));
     std::vector<PlacedLayer> placed;
@@ -210,7 +233,14 @@ Result<HostPicture> drawOnHost(std::span<const HostDataset> datasets, const Fram
         VCP_TRY(place(each, request));
         layers.push_back(layerOf(each, request));
     }
-    VCP_TRY(drawLayers(layers, datasets, request, options, picture));
+    std::vector<HostSurface> drawn;
+    for (const PreparedSurface& each : surfaces) {
+        const meso::Shell& shell = each.surface->shell;
+        drawn.push_back(
+            {*each.surface->arrays, shell, each.look.view, *each.words, each.look.textures, each.look.isFarDrawn});
+        setPicture(drawn.back().view, shell.origin, request);
+    }
+    VCP_TRY(drawLayers(layers, drawn, datasets, request, options, picture));
     if (request.sample == 0) tell(placed, layers, picture);
     return picture;
 }
@@ -221,8 +251,14 @@ std::vector<uint64_t> cutNumbers(std::span<const HostDataset> datasets) {
     return all;
 }
 
-FrameStats hostStats(std::span<const HostDataset> datasets, const HostPicture& picture) {
-    FrameStats stats{.rays = picture.depth.size(), .tracedRays = picture.depth.size(), .onHost = true};
+FrameStats hostStats(std::span<const HostDataset> datasets, std::span<const PreparedSurface> surfaces,
+                     const HostPicture& picture) {
+    FrameStats stats{.rays = picture.depth.size(),
+                     .tracedRays = picture.depth.size(),
+                     .unresolvedRays = picture.unresolvedRays,
+                     .farHits = picture.farSurfaceHits,
+                     .surfaceBytes = bytesOf(surfaces),
+                     .onHost = true};
     for (const HostDataset& each : datasets) {
         stats.poolBytes = each.residency.pages().bytes();  // of all datasets
         stats.colourBytes += each.residency.colourBytes();

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstring>
 #include <limits>
+#include <utility>
 
 #include "render/frame_setup.h"
 #include "render/pages/host_page_memory.h"
@@ -33,17 +34,47 @@ Result<std::unique_ptr<HostRenderer>> HostRenderer::create(const RendererOptions
 
 Result<void> HostRenderer::open(std::vector<PlacedDataset> datasets, std::span<const MesoSurface> surfaces) {
     datasets_.clear();
-    VCP_TRY(setSurfaces(surfaces));
-    for (const PlacedDataset& placed : datasets) VCP_TRY(checkHostDraws(*placed.dataset, placed.source->name()));
-    VCP_TRY_ASSIGN(datasets_, openResidencies(hostPageMemory(), options_, std::move(datasets)));
+    VCP_TRY(takeSurfaces(surfaces));
+    const auto openAll = [&]() -> Result<void> {
+        for (const PlacedDataset& placed : datasets) VCP_TRY(checkHostDraws(*placed.dataset, placed.source->name()));
+        RendererOptions left = options_;
+        VCP_TRY_ASSIGN(left.budgetBytes, budgetOfPages(options_.budgetBytes, bytesOf(prepared_)));
+        VCP_TRY_ASSIGN(datasets_, openResidencies(hostPageMemory(), left, std::move(datasets)));
+        return {};
+    };
+    if (auto opened = openAll(); !opened) {
+        VCP_TRY(takeSurfaces({}));
+        return opened;
+    }
     errorPixels_.assign(datasets_.size(), std::numeric_limits<double>::infinity());
     return {};
 }
 
+Result<void> HostRenderer::takeSurfaces(std::span<const MesoSurface> surfaces) {
+    picture_.reset();
+    surfacesChanged_ = surfacesChanged_ || !surfaces_.empty() || !surfaces.empty();
+    prepared_.clear();
+    surfaces_.assign(surfaces.begin(), surfaces.end());
+    auto prepared = prepareOnHost(surfaces_);
+    if (!prepared) {
+        surfaces_.clear();
+        return prepared.error();
+    }
+    prepared_ = *std::move(prepared);
+    return {};
+}
+
 Result<void> HostRenderer::setSurfaces(std::span<const MesoSurface> surfaces) {
-    if (surfaces.empty()) return {};
-    return Error{.code = ErrorCode::Unsupported,
-                 .message = "the host does not draw surfaces with mesostructure; take a Vulkan device"};
+    const uint64_t before = bytesOf(prepared_);
+    VCP_TRY(takeSurfaces(surfaces));
+    if (datasets_.empty() || bytesOf(prepared_) == before) return {};
+    const auto fit = [&]() -> Result<void> {
+        VCP_TRY_ASSIGN(const auto pageBytes, budgetOfPages(options_.budgetBytes, bytesOf(prepared_)));
+        return sceneOf(datasets_)->setBudgets(hostPageMemory(), pageBytes, options_.ramBytes);
+    };
+    auto fits = fit();
+    if (!fits) VCP_TRY(takeSurfaces({}));
+    return fits;
 }
 
 Result<UpdateResult> HostRenderer::update(const FrameRequest& request) {
@@ -55,8 +86,10 @@ Result<UpdateResult> HostRenderer::update(const FrameRequest& request) {
             shown.push_back({datasets_[i].residency.get(), datasets_[i].placement, &errorPixels_[i]});
     VCP_TRY_ASSIGN(auto all, updateShown(shown, request));
     if (!all)
-        return UpdateResult{
+        all = UpdateResult{
             .settled = true, .drawable = !datasets_.empty(), .errorPixels = std::numeric_limits<double>::infinity()};
+    all->changed = std::exchange(surfacesChanged_, false) || all->changed;
+    all->drawable = all->drawable || !surfaces_.empty();
     return *std::move(all);
 }
 
@@ -66,8 +99,8 @@ Result<FrameStats> HostRenderer::render(const FrameRequest& request, const std::
     VCP_TRY(checkHostDraws(request));
     const auto began = std::chrono::steady_clock::now();
     const std::vector<HostDataset> drawing = drawn(request);
-    VCP_TRY_ASSIGN(auto picture, drawOnHost(drawing, request, cancel));
-    FrameStats stats = hostStats(drawing, picture);
+    VCP_TRY_ASSIGN(auto picture, drawOnHost(drawing, prepared_, request, cancel));
+    FrameStats stats = hostStats(drawing, prepared_, picture);
     stats.msFrame = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - began).count();
     light_ = SampledLight(picture.colours.size());
     picture_ = std::move(picture);
@@ -92,7 +125,7 @@ Result<uint32_t> HostRenderer::refine(const std::function<bool()>& cancel) {
     if (cutNumbers(drawing) != cuts_) return 0u;
     FrameRequest request = request_;
     request.sample = samples;
-    VCP_TRY_ASSIGN(const auto more, drawOnHost(drawing, request, cancel));
+    VCP_TRY_ASSIGN(const auto more, drawOnHost(drawing, prepared_, request, cancel));
     if (samples == 1) light_.add(picture_->colours);
     light_.add(more.colours);
     return light_.samples();
@@ -118,7 +151,9 @@ Result<std::vector<glm::vec3>> HostRenderer::readNormals() {
 
 Result<std::vector<uint32_t>> HostRenderer::readIterations() {
     if (!picture_) return kNothingDrawn;
-    return std::vector<uint32_t>(picture_->depth.size(), 0);
+    std::vector<uint32_t> iterations = picture_->iterations;
+    iterations.resize(picture_->depth.size());
+    return iterations;
 }
 
 }  // namespace vcp

@@ -35,17 +35,22 @@ public:
 
 private:
     explicit HostRenderer(const RendererOptions& options) : options_(options), info_(hostDevice()) {}
+    /// Replaces the surfaces, without regard to the budget. Errors: as of prepareOnHost.
+    Result<void> takeSurfaces(std::span<const MesoSurface> surfaces);
     /// Returns the datasets as render() draws them.
     [[nodiscard]] std::vector<HostDataset> drawn(const FrameRequest& request) const;
 
     const RendererOptions options_;
     const DeviceInfo info_;
     std::vector<PlacedResidency> datasets_;
-    std::vector<double> errorPixels_;     // of each dataset's last update
-    std::optional<HostPicture> picture_;  // the last one; its colours may be of fewer samples than light_
-    FrameRequest request_;                // of that picture
-    std::vector<uint64_t> cuts_;          // numbers of those that it shows
-    SampledLight light_;                  // none before the second sample
+    std::vector<MesoSurface> surfaces_;
+    std::vector<PreparedSurface> prepared_;  // of surfaces_
+    bool surfacesChanged_ = false;           // since the last update
+    std::vector<double> errorPixels_;        // of each dataset's last update
+    std::optional<HostPicture> picture_;     // the last one; its colours may be of fewer samples than light_
+    FrameRequest request_;                   // of that picture
+    std::vector<uint64_t> cuts_;             // numbers of those that it shows
+    SampledLight light_;                     // none before the second sample
 };
 
 }  // namespace vcp

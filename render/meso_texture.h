@@ -1,4 +1,5 @@
-// Textures of mesostructure: pictures over the tile with their coarser levels, as shaders/meso_texture.glsl reads them.
+// Textures of mesostructure: pictures over the tile with their coarser levels, as shared/meso_texture_lookup.h reads
+// them.
 #pragma once
 
 #include <cstdint>

@@ -40,7 +40,7 @@ struct SettledFrame {
     FrameStats stats;
 };
 
-struct MesoSurface;  // render/passes/meso_surface.h
+struct MesoSurface;  // render/meso_surface.h
 
 class PictureRenderer {
 public:

@@ -52,6 +52,16 @@ Result<void> checkBudget(uint64_t budgetBytes) {
                  .message = fmt::format("a budget of {} bytes is too small; at least {}", budgetBytes, kLeastBudget)};
 }
 
+Result<uint64_t> budgetOfPages(uint64_t budgetBytes, uint64_t surfaceBytes) {
+    if (surfaceBytes == 0) return budgetBytes;
+    const uint64_t left = budgetBytes > surfaceBytes ? budgetBytes - surfaceBytes : 0;
+    if (checkBudget(left)) return left;
+    return Error{.code = ErrorCode::Limit,
+                 .message = fmt::format("surfaces with mesostructure take {} bytes, and a budget of {} leaves too few "
+                                        "for the datasets beside them: allow more",
+                                        surfaceBytes, budgetBytes)};
+}
+
 Result<std::vector<PlacedResidency>> openResidencies(const PageMemorySource& memory, const RendererOptions& options,
                                                      std::vector<PlacedDataset> placed) {
     std::vector<PlacedResidency> opened;
@@ -91,9 +101,10 @@ void waitForPage(std::span<const PlacedResidency> datasets, std::chrono::millise
     if (SceneResidency* const scene = sceneOf(datasets)) static_cast<void>(scene->waitForPage(timeout));
 }
 
-double occlusionRadiusAmong(std::span<const PictureDataset> shown) {
+double occlusionRadiusAmong(std::span<const PictureDataset> shown, std::span<const WorldBox> others) {
     constexpr double kPart = 0.1, kFar = std::numeric_limits<double>::infinity();
     glm::dvec3 lo(kFar), hi(-kFar);
+    for (const WorldBox& box : others) lo = glm::min(lo, box.low), hi = glm::max(hi, box.high);
     for (const auto& [dataset, placement] : shown) {
         const FileHeader& header = dataset.header;
         const glm::dvec3 corners[2] = {{header.boundsMin[0], header.boundsMin[1], header.boundsMin[2]},

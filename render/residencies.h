@@ -21,6 +21,9 @@ struct PlacedResidency {
 /// Refuses budgets that are too small for any page. Errors: Usage.
 Result<void> checkBudget(uint64_t budgetBytes);
 
+/// Returns what a budget leaves for pages beside surfaces with mesostructure. Errors: Limit (too little).
+Result<uint64_t> budgetOfPages(uint64_t budgetBytes, uint64_t surfaceBytes);
+
 /// Makes the datasets' residencies, whose one pool comes from `memory`, within options.budgetBytes and ramBytes.
 /// Errors: as of SceneResidency::create.
 Result<std::vector<PlacedResidency>> openResidencies(const PageMemorySource& memory, const RendererOptions& options,
@@ -38,9 +41,14 @@ struct PictureDataset {
     Similarity placement;
 };
 
-/// Returns how far occlusion reaches in a picture of several datasets where nothing else is asked for: a tenth of the
-/// diagonal of the box about all of them; world units.
-double occlusionRadiusAmong(std::span<const PictureDataset> shown);
+/// A box along the world's axes.
+struct WorldBox {
+    glm::dvec3 low, high;
+};
+
+/// Returns how far occlusion reaches in a picture of several datasets, and of what is in boxes, where nothing else is
+/// asked for: a tenth of the diagonal of the box about all of them; world units.
+double occlusionRadiusAmong(std::span<const PictureDataset> shown, std::span<const WorldBox> others = {});
 
 /// A dataset that a view shows.
 struct ShownResidency {

@@ -20,7 +20,8 @@ namespace vcp {
 
 /// The page that a pixel shows.
 struct HostHit {
-    uint32_t dataset = UINT32_MAX;  ///< number of its layer; UINT32_MAX where nothing is hit
+    static constexpr uint32_t kOnSurface = UINT32_MAX - 1;
+    uint32_t dataset = UINT32_MAX;  ///< number of its layer; kOnSurface; UINT32_MAX where nothing is hit
     uint32_t page : 31 = 0;         ///< index in the layer's scene; of a cap, of what is behind it
     uint32_t onCap : 1 = 0;         ///< the hit is on the cap of a section
 };
@@ -35,6 +36,8 @@ struct HostPicture {
     std::vector<float> depth;        ///< world units along the unit ray; infinite where nothing is hit
     std::vector<glm::vec3> normals;  ///< unit, world axes, towards the viewer; 0 where nothing is hit
     std::vector<HostHit> hits;
+    std::vector<uint32_t> iterations;                 ///< of rays in mesostructure; empty without surfaces
+    uint64_t unresolvedRays = 0, farSurfaceHits = 0;  ///< in mesostructure (SurfaceWork)
 };
 
 /// The light of a picture's samples: of each pixel the sum of light times alpha, and of alpha.

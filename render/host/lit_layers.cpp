@@ -1,12 +1,14 @@
 #include "render/host/lit_layers.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <limits>
 #include <memory>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <glm/packing.hpp>
 
 #include "render/host/hit_light.h"
 #include "render/host/layer_tiles.h"
@@ -35,13 +37,22 @@ struct Lit {
     const double cell;  // world units
 };
 
+/// What a pixel shows that is seen from far of a surface.
+struct FarLook {
+    bool isFar = false;
+    float sky = 0;
+    glm::vec4 light{0};
+};
+
 /// What is kept of each pixel beside the picture's depth, normal and hit; lengths are world units.
 struct LitPlanes {
-    explicit LitPlanes(size_t pixels) : albedo(pixels), lift(pixels), edge(pixels), sun(pixels), sky(pixels) {}
+    LitPlanes(size_t pixels, bool hasFar)
+        : albedo(pixels), lift(pixels), edge(pixels), sun(pixels), sky(pixels), far(hasFar ? pixels : 0) {}
 
     std::vector<glm::vec3> albedo;
     std::vector<float> lift, edge;  // by which rays of light begin above the hit; of the pixel there
     std::vector<uint8_t> sun, sky;
+    std::vector<FarLook> far;  // empty where no surface is seen from far
 };
 
 /// The hits of a tile, and the light there.
@@ -50,6 +61,7 @@ struct LitTile {
         glm::ivec2 pixel;
         size_t at;  // in the picture
         glm::vec3 normal;
+        bool onSurface;
     };
     Pixel pixels[kTilePixels];
     size_t count = 0;
@@ -57,36 +69,41 @@ struct LitTile {
 
 class LitDrawing {
 public:
-    LitDrawing(std::span<const HostLayer> layers, HostPicture& picture)
+    LitDrawing(const LitScene& scene, HostPicture& picture)
         : picture_(picture),
-          planes_(picture.colours.size()),
-          frame_(layers.front().frame),
-          reach_(frame_.occlusionReach * frame_.worldPerCell) {
-        for (const HostLayer& layer : layers) {
+          surfaces_(scene.surfaces),
+          planes_(picture.colours.size(), std::ranges::any_of(scene.surfaces, &HostSurface::isFarDrawn)),
+          frame_(scene.frame),
+          reach_(scene.occlusionReach) {
+        for (const HostLayer& layer : scene.layers) {
             lit_.push_back(std::make_unique<Lit>(layer, picture.size));
             isMarking_ = isMarking_ || layer.marks != nullptr;
         }
-        // Light is computed in the world's axes.
-        const glm::quat turn = lit_.front()->tiles.turn();
-        const auto turned = [&](glm::vec4& light) { light = glm::vec4(turn * glm::vec3(light), light.w); };
-        turned(frame_.lightDirection);
-        for (glm::vec4& light : frame_.moreLights) turned(light);
-        frame_.upDirection = glm::vec4(turn * glm::vec3(frame_.upDirection), 0);
+        if (!surfaces_.empty()) picture_.iterations.resize(picture_.colours.size());
     }
 
     Result<void> draw(const HostCastOptions& options) {
         const bool averagesSky = frame_.occlusionRays > 0;
         VCP_TRY(forEachTile(picture_.size, options, [&](glm::ivec2 corner) {
             for (const auto& each : lit_) castLayer(*each, corner);
+            SurfaceWork work;
+            std::vector<SurfaceCaster> casters;
+            for (const HostSurface& surface : surfaces_) casters.emplace_back(surface);
+            for (SurfaceCaster& caster : casters) castSurface(caster, corner, work);
             const LitTile tile = hitsOf(corner);
             if (tile.count == 0) return;
             for (size_t k = 0; k < tile.count; ++k) planes_.sun[tile.pixels[k].at] = 255;
-            for (uint32_t i = 0; frame_.hasShadows != 0 && i < frame_.lightCount; ++i) castSun(tile, i);
+            for (uint32_t i = 0; frame_.hasShadows != 0 && i < frame_.lightCount; ++i) {
+                castSun(tile, i);
+                for (SurfaceCaster& caster : casters) castSun(caster, tile, i, work);
+            }
             if (averagesSky)
-                castSky(tile);
+                castSky(tile, casters, work);
             else
                 shade(corner, false);
+            unresolvedRays_ += work.unresolvedRays, farHits_ += work.farHits;
         }));
+        picture_.unresolvedRays += unresolvedRays_, picture_.farSurfaceHits += farHits_;
         if (!averagesSky) return {};
         return forEachTile(picture_.size, options, [&](glm::ivec2 corner) { shade(corner, true); });
     }
@@ -119,14 +136,36 @@ private:
         });
     }
 
+    /// Does the same with a surface.
+    void castSurface(SurfaceCaster& caster, glm::ivec2 corner, SurfaceWork& work) {
+        forEachPixel(picture_.size, corner, [&](glm::ivec2 pixel, int) {
+            const size_t to = at(pixel);
+            SurfaceHit hit;
+            hit.depth = picture_.depth[to];
+            if (!caster.castPixel(pixel, hit, picture_.iterations[to], work)) return;
+            picture_.depth[to] = hit.depth;
+            picture_.normals[to] = hit.normal;
+            picture_.hits[to] = {.dataset = HostHit::kOnSurface};
+            planes_.albedo[to] = hit.colour;
+            planes_.lift[to] = caster.surface().view.shadowLift;
+            planes_.edge[to] = hit.width;
+            if (!planes_.far.empty()) planes_.far[to] = {hit.isFar, hit.sky, hit.light};
+        });
+    }
+
+    /// Returns the hits of what is drawn: without layers, those on surfaces.
     [[nodiscard]] LitTile hitsOf(glm::ivec2 corner) const {
         LitTile tile;
         forEachPixel(picture_.size, corner, [&](glm::ivec2 pixel, int) {
             const size_t from = at(pixel);
-            if (picture_.depth[from] < kNothing) tile.pixels[tile.count++] = {pixel, from, picture_.normals[from]};
+            const bool onSurface = picture_.hits[from].dataset == HostHit::kOnSurface;
+            if (picture_.depth[from] < kNothing && (onSurface || !lit_.empty()))
+                tile.pixels[tile.count++] = {pixel, from, picture_.normals[from], onSurface};
         });
         return tile;
     }
+
+    [[nodiscard]] bool isFar(size_t pixel) const { return !planes_.far.empty() && planes_.far[pixel].isFar; }
 
     /// Returns a ray of light through a layer from above a hit. `direction`: in the world; `reach`: world units.
     [[nodiscard]] LightRay lightRay(const Lit& each, const LitTile::Pixel& from, glm::vec3 direction,
@@ -148,7 +187,7 @@ private:
             size_t count = 0;
             for (size_t k = 0; k < tile.count; ++k) {
                 const LitTile::Pixel& pixel = tile.pixels[k];
-                if (!(glm::dot(pixel.normal, light) > 0))
+                if (!(glm::dot(pixel.normal, light) > 0) && !isFar(pixel.at))
                     darken(pixel);
                 else if (isMarking_ || (planes_.sun[pixel.at] & bits) != 0) {
                     rays[count] = lightRay(*each, pixel, light, frame::kNoHit);
@@ -161,7 +200,25 @@ private:
         }
     }
 
-    void castSky(const LitTile& tile) {
+    /// Returns where a ray of light through a surface begins. From a surface it begins as the shaders have it.
+    [[nodiscard]] SurfaceCaster::Start startOf(const SurfaceCaster& caster, const LitTile::Pixel& from) const {
+        return {from.pixel, picture_.depth[from.at], from.normal,
+                from.onSurface ? caster.surface().view.shadowLift : planes_.lift[from.at], planes_.edge[from.at]};
+    }
+
+    void castSun(SurfaceCaster& caster, const LitTile& tile, uint32_t number, SurfaceWork& work) {
+        const glm::vec3 light(lightNumbered(frame_, number));
+        const uint8_t bits = bitsOfLight(frame_, number);
+        for (size_t k = 0; k < tile.count; ++k) {
+            const LitTile::Pixel& from = tile.pixels[k];
+            if ((planes_.sun[from.at] & bits) == 0) continue;
+            const float kFar = frame::kMesoNoHit;
+            if (caster.castLight(startOf(caster, from), light, kFar, true, work) < kFar)
+                planes_.sun[from.at] &= uint8_t(~bits);
+        }
+    }
+
+    void castSky(const LitTile& tile, std::span<SurfaceCaster> casters, SurfaceWork& work) {
         glm::vec3 directions[kAtOnce * kTilePixels];
         float near[kAtOnce * kTilePixels], seen[kTilePixels] = {};
         for (uint32_t first = 0; first < frame_.occlusionRays; first += kAtOnce) {
@@ -175,6 +232,10 @@ private:
                 }
             std::fill_n(near, numbers * tile.count, reach_);
             for (const auto& each : lit_) castNearer(*each, tile, {directions, numbers * tile.count}, near);
+            for (SurfaceCaster& caster : casters)
+                for (size_t i = 0; i < numbers * tile.count; ++i)
+                    near[i] = caster.castLight(startOf(caster, tile.pixels[i % tile.count]), directions[i], near[i],
+                                               false, work);
             for (size_t i = 0; i < numbers * tile.count; ++i)
                 seen[i % tile.count] += near[i] < reach_ ? f32::skyBehind(near[i] / reach_) : 1.0f;
         }
@@ -199,7 +260,7 @@ private:
         if (tile.count == 0) return;
         TileSurface surface{};
         for (size_t k = 0; k < tile.count; ++k) {
-            const auto& [pixel, from, normal] = tile.pixels[k];
+            const auto& [pixel, from, normal, onSurface] = tile.pixels[k];
             surface.normalX[k] = normal.x, surface.normalY[k] = normal.y, surface.normalZ[k] = normal.z;
             setAlbedo(surface, int(k), glm::vec4(planes_.albedo[from], 1));
             surface.sun[k] = float(planes_.sun[from]) / 255;
@@ -209,21 +270,37 @@ private:
         }
         alignas(32) uint32_t colours[kTilePixels];
         shadeTile(frame_, surface, colours);
-        for (size_t k = 0; k < tile.count; ++k) picture_.colours[tile.pixels[k].at] = colours[k];
+        for (size_t k = 0; k < tile.count; ++k) {
+            const size_t to = tile.pixels[k].at;
+            const bool isLit = frame_.shadingMode != frame::kShadeNormals && frame_.shadingMode != frame::kShadeUnlit;
+            picture_.colours[to] = isLit && isFar(to) ? farColour(to, surface.sky[k]) : colours[k];
+        }
+    }
+
+    /// Returns the colour of what stands for many points.
+    [[nodiscard]] uint32_t farColour(size_t pixel, float skySeen) const {
+        const FarLook& far = planes_.far[pixel];
+        float sun = 0;
+        for (uint32_t i = 0; i < frame_.lightCount; ++i)
+            if ((planes_.sun[pixel] & bitsOfLight(frame_, i)) != 0)
+                sun += frame::kMesoSun * lightNumbered(frame_, i).w * far.light[int(i)];
+        return glm::packUnorm4x8(glm::vec4(planes_.albedo[pixel] * f32::lightUnderSky(far.sky, sun, skySeen), 1));
     }
 
     HostPicture& picture_;
+    const std::span<const HostSurface> surfaces_;
     LitPlanes planes_;
-    frame::FrameConstants frame_;  // as of the first layer, in the world's axes
-    const float reach_;            // of occlusion, world units
+    const frame::FrameConstants frame_;  // in the world's axes
+    const float reach_;                  // of occlusion, world units
+    std::atomic<uint64_t> unresolvedRays_ = 0, farHits_ = 0;
     bool isMarking_ = false;
     std::vector<std::unique_ptr<const Lit>> lit_;
 };
 
 }  // namespace
 
-Result<void> drawLitLayers(std::span<const HostLayer> layers, const HostCastOptions& options, HostPicture& picture) {
-    return LitDrawing(layers, picture).draw(options);
+Result<void> drawLitScene(const LitScene& scene, const HostCastOptions& options, HostPicture& picture) {
+    return LitDrawing(scene, picture).draw(options);
 }
 
 }  // namespace vcp

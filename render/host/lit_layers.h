@@ -1,17 +1,23 @@
-// Several layers in one picture that shade each other: rays of light go through all of them.
+// Draws several datasets and surfaces with mesostructure that shade each other: the first hits of all, tile by tile,
+// then their rays of light through each. Surfaces alone are drawn so too, over what is in the picture.
 #pragma once
 
 #include <span>
 
 #include "render/host/host_picture.h"
+#include "render/host/surface_caster.h"
 
 namespace vcp {
 
-/// Draws layers over the background in `picture`: at each pixel the nearest surface, in the light that all of them
-/// leave. Each ray of light is cast through one layer after the other, in that layer's own space, with its placement
-/// and its cut; where pages are marked, every ray goes through every layer, so that what is marked in one does not
-/// depend on the others. Precondition: frame.hasShadows or frame.occlusionRays, the same in all layers; nothing but the
-/// background is in the picture. Errors: Cancelled, between tiles.
-Result<void> drawLitLayers(std::span<const HostLayer> layers, const HostCastOptions& options, HostPicture& picture);
+struct LitScene {
+    std::span<const HostLayer> layers;
+    std::span<const HostSurface> surfaces;
+    frame::FrameConstants frame;  ///< of the picture without a dataset: light, in the world's axes
+    float occlusionReach = 0;     ///< world units
+};
+
+/// Draws all of a scene, the nearest at each pixel. Where it has layers, the picture is the background before.
+/// Precondition: frame.shadingMode is no false colour where there are layers. Errors: Cancelled, between tiles.
+Result<void> drawLitScene(const LitScene& scene, const HostCastOptions& options, HostPicture& picture);
 
 }  // namespace vcp

@@ -19,7 +19,7 @@
 #include <vector>
 
 #include "mesostructure/march_arrays.h"
-#include "render/meso_view.h"
+#include "render/shared/meso_view.h"
 #include "render/vulkan/compute_pipeline.h"
 #include "render/vulkan/device.h"
 

@@ -6,21 +6,14 @@
 #pragma once
 
 #include <array>
-#include <memory>
 
-#include "mesostructure/remesh/remesher.h"
 #include "render/camera.h"
+#include "render/meso_surface.h"
 #include "render/passes/frame_resources.h"
 #include "render/passes/meso_resources.h"
 #include "render/vulkan/raster_pipeline.h"
 
 namespace vcp {
-
-/// A displaced surface and how fine it is remeshed.
-struct RemeshedSurface {
-    std::shared_ptr<const meso::RemeshSurface> surface;
-    meso::RemeshOptions options;
-};
 
 /// Where a picture, or a tile of one, is seen from.
 struct RemeshLook {

@@ -11,6 +11,7 @@
 #include "mesostructure/shared/march_layout.h"
 #include "mesostructure/shared/shell_layout.h"
 #include "render/shared/meso_layout.h"
+#include "render/shared/shell_records.h"
 
 layout(constant_id = 0) const uint kWalk = 0u;
 layout(constant_id = 1) const uint kSkip = 0u;
@@ -32,3 +33,5 @@ layout(set = 0, binding = 7) uniform textureBuffer lookTexels;  // what is seen 
 
 uint fetchWord(uint i) { return texelFetch(wordTexels, int(i)).x; }
 uvec4 fetchQuad(uint i) { return texelFetch(quadTexels, int(i)); }
+vec4 fetchInput(int i) { return texelFetch(inputTexels, i); }
+vec4 fetchLook(int i) { return texelFetch(lookTexels, i); }

@@ -8,6 +8,7 @@ layout(local_size_x = 8, local_size_y = 8) in;
 uint fetchHit(uint i) { return hits[i]; }
 #include "render/shaders/hit_records.glsl"
 #include "render/shared/hit_light.h"
+#include "render/shared/meso_light.h"
 
 void main() {
     uvec2 pixel = gl_GlobalInvocationID.xy;
@@ -24,9 +25,11 @@ void main() {
     uint code = hits[kMesoPlaneNormal * plane + index];
     if (code == 0u) return;
     vec3 n = unpackHitNormal(code);
-    vec4 colour = unpackUnorm4x8(hits[kMesoPlaneLook * plane + index]);
-    float sun = max(dot(n, view.light), 0.0) * colour.w, sky = 0.5 + 0.5 * dot(n, view.up);
-    vec3 lit = colour.xyz * pow(kMesoSun * sun + kMesoAmbient + kMesoSky * sky, 1.0 / 2.2);
-    vec3 result = shown == kMesoShowNormals ? n * 0.5 + 0.5 : shown == kMesoShowUnlit ? colour.xyz : lit;
+    vec4 look = unpackUnorm4x8(hits[kMesoPlaneLook * plane + index]);
+    vec3 result = look.xyz;
+    if (shown == kMesoShowNormals)
+        result = n * 0.5 + 0.5;
+    else if (shown == kMesoShowLit)
+        result *= mesoLight(n, look.w, unpackUnorm4x8(hits[kMesoPlaneLight * plane + index]), 1.0);
     picturePixels[index] = packUnorm4x8(vec4(result, 1.0));
 }

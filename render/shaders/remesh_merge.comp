@@ -8,7 +8,7 @@ layout(local_size_x = 8, local_size_y = 8) in;
 
 uint fetchHit(uint i) { return hits[i]; }
 #include "render/shaders/hit_records.glsl"
-#include "render/shaders/meso_texture.glsl"
+#include "render/shared/meso_texture_lookup.h"
 
 void main() {
     uvec2 pixel = gl_GlobalInvocationID.xy;
@@ -23,5 +23,6 @@ void main() {
     // 0 means that a pixel has no mesostructure.
     hits[kMesoPlaneNormal * plane + index] = max(packHitNormal(surface.xyz), 1u);
     hits[kMesoPlaneLook * plane + index] = packUnorm4x8(look);
+    hits[kMesoPlaneLight * plane + index] = ~0u;  // before shadows, all of each light arrives
     hits[kMesoPlaneIterations * plane + index] += 1u;
 }

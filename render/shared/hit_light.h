@@ -2,14 +2,18 @@
 // and, up to the line that says so, for several pixels at once (render/host/tile_shading.cpp). Only the common subset
 // of GLSL and GLM is used.
 
-// Returns the light that falls on a surface, encoded for the screen. A power of a product is the product of the powers:
-// colours come encoded, so that one power a pixel is enough.
+// Returns the light that falls on a surface that faces a part of the sky, encoded for the screen. A power of a product
+// is the product of the powers: colours come encoded, so that one power a pixel is enough.
 // `sunlight`: sunlightOf, of all lights together.
-INLINE Real encodedLight(Real3 n, Real3 up, Real sunlight, Real skySeen) {
-    Real sky = Real(0.5) + Real(0.5) * dot(n, up);
+INLINE Real lightUnderSky(Real sky, Real sunlight, Real skySeen) {
     // Hollows are darker than the sun alone would have them: they see less of what it lights.
     return pow(sunlight * (Real(0.5) + Real(0.5) * skySeen) + (Real(0.10) + Real(0.18) * sky) * skySeen,
                Real(1.0 / 2.2));
+}
+
+// Returns the same of a surface with a normal.
+INLINE Real encodedLight(Real3 n, Real3 up, Real sunlight, Real skySeen) {
+    return lightUnderSky(Real(0.5) + Real(0.5) * dot(n, up), sunlight, skySeen);
 }
 
 // Returns what a light of strength 1 gives, where a part of it is seen.

@@ -1,10 +1,9 @@
 // What the CPU hands to the mesostructure shaders, besides what mesostructure/shared/ lays out. Compiles as C++
-// (render/meso_view.h) and as GLSL; made of groups of 16 bytes as frame_layout.h is.
+// (render/shared/meso_view.h) and as GLSL; made of groups of 16 bytes as frame_layout.h is.
 
 const uint kMesoColours = 1u, kMesoNormals = 2u;  // bits of kTextures, which is their sum
 
-// The parts of the light: of the sun by n . l, of the sky by how far n points up, and from everywhere.
-const float kMesoSun = 0.72f, kMesoSky = 0.18f, kMesoAmbient = 0.10f;
+const float kMesoSun = 0.72f;  // what a light of strength 1 gives at most, as sunlightOf (hit_light.h)
 
 // What the pictures show.
 const uint kMesoShowLit = 0u, kMesoShowHeat = 1u, kMesoShowNormals = 2u, kMesoShowUnlit = 3u;
@@ -13,11 +12,13 @@ const float kMesoHottest = 100.0f;  // iterations that the heat map shows as its
 const float kMesoNoHit = 1e30f;  // from here on, a depth is none
 
 // The planes of the hits of a picture: the depth along the unit ray, the packed normal (hit_records.glsl; 0: no hit),
-// colour and light, iterations.
-const uint kMesoPlaneDepth = 0u, kMesoPlaneNormal = 1u, kMesoPlaneLook = 2u, kMesoPlaneIterations = 3u;
-const uint kMesoPlanes = 4u;
+// the look (ShellLook), iterations, and how much of each light arrives (8 bits each).
+const uint kMesoPlaneDepth = 0u, kMesoPlaneNormal = 1u, kMesoPlaneLook = 2u, kMesoPlaneIterations = 3u,
+           kMesoPlaneLight = 4u;
+const uint kMesoPlanes = 5u;
 
 const uint kMesoMaxSections = 6u;
+const uint kMesoMaxLights = 4u;
 
 // A texture over the tile, with its smaller levels.
 struct MesoImage {
@@ -32,10 +33,8 @@ struct MesoView {
     uint width, height;                // of the picture; of a list of rays the width is their number
     uint nodes;                        // of the shell
     uint withBase;                     // 1: the base is drawn too
-    vec3 light;                        // unit, towards the light
-    float shadowLift;                  // world units by which shadow rays start above a hit
     vec3 colour;                       // of what the surface is made
-    uint unused0;
+    uint lightCount;
     vec3 up;     // unit
     uint shows;  // what the picture shows
     MesoImage colours, normals;
@@ -43,5 +42,8 @@ struct MesoView {
     float meanHeight;   // tile units
     uint farShadows;    // 1: what is seen from far has the shadows of the mesostructure on itself
     uint sectionCount;
+    float shadowLift;  // world units by which shadow rays start above a hit
+    uint unused0, unused1, unused2;
+    vec4 lights[kMesoMaxLights];      // unit, towards each light; w: its strength
     vec4 sections[kMesoMaxSections];  // as FrameConstants::sections, in world units from the shell's origin
 };

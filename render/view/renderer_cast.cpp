@@ -19,7 +19,8 @@ void copyInto(const Buffer& buffer, std::span<const uint32_t> colours) {
 }  // namespace
 
 bool Renderer::View::isCastOnHost(const FrameRequest& request) const {
-    if (!shared->options.hostRays || !shared->info.software || shared->meso || !checkHostDraws(request)) return false;
+    if (!shared->options.hostRays || !shared->info.software || !checkHostDraws(request)) return false;
+    if (shared->meso && shared->preparedSurfaces().empty()) return false;
     return std::all_of(layers.begin(), layers.end(), [](const Layer& layer) {
         if (layer.residency == nullptr) return true;
         return checkHostDraws(layer.residency->dataset(), "").ok() && !poolOf(*layer.residency).bytesOf({0, 1}).empty();
@@ -41,7 +42,7 @@ Result<void> Renderer::View::cast(size_t which, const FrameRequest& request, con
     const std::vector<HostDataset> datasets = hostDatasets();
     Buffer colours = frame.cast ? std::move(frame.cast->colours) : Buffer();
     frame.cast.reset();
-    VCP_TRY_ASSIGN(auto picture, drawOnHost(datasets, request, cancel));
+    VCP_TRY_ASSIGN(auto picture, drawOnHost(datasets, shared->preparedSurfaces(), request, cancel));
     if (colours.bytes() != picture.colours.size() * sizeof(uint32_t)) {
         VCP_TRY_ASSIGN(
             colours, shared->device->createBuffer(picture.colours.size() * sizeof(uint32_t),
@@ -56,7 +57,7 @@ Result<void> Renderer::View::cast(size_t which, const FrameRequest& request, con
     frame.nextStep = 0;
     frame.submission = 0;
     frame.isAhead = false;
-    frame.stats = hostStats(datasets, picture);
+    frame.stats = hostStats(datasets, shared->preparedSurfaces(), picture);
     SampledLight light(picture.colours.size());
     frame.cast = {std::move(picture), cutNumbers(datasets), std::move(light), std::move(colours)};
     frame.stats.msFrame = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - began).count();
@@ -72,8 +73,8 @@ Result<uint32_t> Renderer::View::castPart() {
     if (cutNumbers(datasets) != cast.cuts || !isCastOnHost(shown.request)) return 0u;
     FrameRequest request = shown.request;
     request.sample = samples;
-    const PicturePart part = picturePart(request, nextPart, raysPerPixel(request, false));
-    VCP_TRY_ASSIGN(const auto drawnPart, drawOnHost(datasets, part.request, {}));
+    const PicturePart part = picturePart(request, nextPart, raysPerPixel(request, shared->meso != nullptr));
+    VCP_TRY_ASSIGN(const auto drawnPart, drawOnHost(datasets, shared->preparedSurfaces(), part.request, {}));
     if (samples == 1 && nextPart == 0) cast.light.add(cast.picture.colours);
     const size_t width = request.width;
     cast.light.add(std::span(drawnPart.colours).subspan(part.skippedRows * width, part.rows * width), part.row * width);
@@ -91,7 +92,8 @@ std::optional<PixelHit> Renderer::View::castHit(const Frame& frame, PicturePixel
     const size_t at = size_t{pixel.y} * frame.request.width + pixel.x;
     if (picture.hits[at].dataset == HostHit().dataset) return {};
     PixelHit hit = pixelHit(frame.request, pixel, double(picture.depth[at]), picture.normals[at]);
-    hit.dataset = picture.hits[at].dataset;
+    hit.onSurface = picture.hits[at].dataset == HostHit::kOnSurface;
+    hit.dataset = hit.onSurface ? 0 : picture.hits[at].dataset;
     hit.onCap = picture.hits[at].onCap != 0;
     return hit;
 }

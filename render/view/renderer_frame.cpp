@@ -21,30 +21,6 @@ constexpr uint64_t kMostRaysAtOnce = 8 * kPartRays;
 constexpr double kStepSeconds = 0.04;
 constexpr uint64_t kFewestStepRays = 1 << 12;
 
-MesoShading mesoShading(ShadingMode mode) {
-    switch (mode) {
-        case ShadingMode::Normals:
-            return MesoShading::Normals;
-        case ShadingMode::Unlit:
-            return MesoShading::Unlit;
-        case ShadingMode::Steps:
-            return MesoShading::Heat;
-        default:
-            return MesoShading::Lit;
-    }
-}
-
-MesoLook mesoLook(const FrameRequest& request) {
-    const PictureTile tile = wholePicture(request);
-    const LightDirections directions =
-        lightDirections(request, cameraBasis(request.camera, tile.fullWidth, tile.fullHeight));
-    return {request.camera,     tile,
-            upperLeft(request), directions.light,
-            directions.sky,     request.shading.shadows,
-            request.sections,   mesoShading(request.shading.mode),
-            request.errorPixels};
-}
-
 }  // namespace
 
 PassConstants Renderer::View::constantsFor(const Layer& layer, const FrameRequest& request) const {
@@ -234,11 +210,10 @@ void Renderer::View::recordShade(VkCommandBuffer commands, Frame& frame, size_t 
 Result<void> Renderer::View::recordSurfaces(VkCommandBuffer commands, Frame& frame) {
     const Shared::Meso& meso = *shared->meso;
     const Buffer& picture = frame.layers.front().resources->picture();
-    const MesoLook look = mesoLook(frame.request);
-    VCP_TRY(meso.pass->prepare(frame.surfaces, {frame.request.width, frame.request.height}, picture, look));
+    VCP_TRY(meso.pass->prepare(frame.surfaces, picture, frame.request));
     frame.surfacesTimer.reset(commands);
     frame.surfacesTimer.mark(commands, 0);
-    meso.pass->record(commands, frame.surfaces, look, frame.target.depths(), frame.cursor);
+    meso.pass->record(commands, frame.surfaces, frame.request, frame.target.depths(), frame.cursor);
     frame.surfacesTimer.mark(commands, 1);
     frame.stats.pipelines += meso.resources->pipelinesMade();
     frame.stats.surfaceBytes = meso.pass->assetBytes();

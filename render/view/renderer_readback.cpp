@@ -143,8 +143,7 @@ Result<std::vector<glm::vec3>> Renderer::readNormals() {
 
 Result<std::vector<uint32_t>> Renderer::readIterations() {
     VCP_TRY_ASSIGN(const auto frame, view_->lastFrame());
-    if (frame->cast) return std::vector<uint32_t>(frame->size().pixels(), 0);
-    auto words = view_->mesoPlane(*frame, frame::kMesoPlaneIterations);
+    auto words = frame->cast ? frame->cast->picture.iterations : view_->mesoPlane(*frame, frame::kMesoPlaneIterations);
     if (words) words->resize(frame->size().pixels());
     return words;
 }

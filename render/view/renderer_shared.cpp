@@ -28,6 +28,11 @@ void Renderer::Shared::take(std::unique_ptr<Device> made) {
 
 Result<void> Renderer::Shared::uploadSurfaces() {
     if (!meso) return {};
+    // The shaders draw what the processor does not.
+    if (auto prepared = prepareOnHost(meso->surfaces); prepared && options.hostRays && info.software)
+        meso->prepared = *std::move(prepared);
+    else
+        meso->prepared.clear();
     const auto upload = [&]() -> Result<void> {
         if (meso->pass) return meso->pass->setSurfaces(meso->surfaces);
         VCP_TRY_ASSIGN(meso->resources, MesoResources::create(*device));
@@ -40,14 +45,7 @@ Result<void> Renderer::Shared::uploadSurfaces() {
 }
 
 Result<uint64_t> Renderer::Shared::pageBudget(uint64_t budgetBytes) const {
-    const uint64_t taken = surfaceBytes();
-    if (taken == 0) return budgetBytes;
-    const uint64_t left = budgetBytes > taken ? budgetBytes - taken : 0;
-    if (checkBudget(left)) return left;
-    return Error{.code = ErrorCode::Limit,
-                 .message = fmt::format("surfaces with mesostructure take {} bytes, and a budget of {} leaves too few "
-                                        "for the datasets beside them: allow more",
-                                        taken, budgetBytes)};
+    return budgetOfPages(budgetBytes, surfaceBytes());
 }
 
 Result<void> Renderer::Shared::addDatasets(std::vector<PlacedDataset> placed) {

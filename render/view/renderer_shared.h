@@ -45,7 +45,8 @@ struct Renderer::Shared {
     AccumulatePass accumulate;
     /// The surfaces with mesostructure, and what draws them.
     struct Meso {
-        std::vector<MesoSurface> surfaces;  // kept to be uploaded again
+        std::vector<MesoSurface> surfaces;      // kept to be uploaded again
+        std::vector<PreparedSurface> prepared;  // of them, where the processor casts the rays; else none
         std::unique_ptr<MesoResources> resources;
         std::unique_ptr<MesoSurfacePass> pass;
     };
@@ -60,6 +61,10 @@ struct Renderer::Shared {
     void take(std::unique_ptr<Device> made);
     /// Uploads the copies of the surfaces to the device. After an error there are none.
     Result<void> uploadSurfaces();
+    /// Returns the surfaces as the processor draws them; nothing where it does not, or where there are none.
+    [[nodiscard]] std::span<const PreparedSurface> preparedSurfaces() const {
+        return meso ? std::span<const PreparedSurface>(meso->prepared) : std::span<const PreparedSurface>();
+    }
     /// Bytes of the surfaces, which the budget pays for before pages.
     [[nodiscard]] uint64_t surfaceBytes() const { return meso && meso->pass ? meso->pass->assetBytes() : 0; }
     /// Returns what the surfaces leave of a budget for pages. Errors: Limit, where that is too little.

@@ -36,7 +36,7 @@ const std::vector<Room>& rooms() {
         {"mesostructure/remesh", {"octree/", "mesostructure", "mesostructure/base"}},
         {"streaming", {"octree/"}},
         {"render/shared", {}},
-        {"render/host", {"octree/", "render/shared"}},
+        {"render/host", {"octree/", "mesostructure", "render/shared"}},
         {"render/pages", {"octree/", "streaming", "render/shared"}},
         {"render",
          {"octree/", "mesostructure", "mesostructure/remesh", "streaming", "render/shared", "render/host",

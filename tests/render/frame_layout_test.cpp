@@ -125,12 +125,13 @@ TEST(FrameLayout, Mesostructure) {
     EXPECT_EQ(
         offsets.at("MesoView"),
         (Words{
-            AT(MesoView, eye),        AT(MesoView, eyeX),         AT(MesoView, eyeY),        AT(MesoView, forward),
-            AT(MesoView, forwardX),   AT(MesoView, forwardY),     AT(MesoView, width),       AT(MesoView, height),
-            AT(MesoView, nodes),      AT(MesoView, withBase),     AT(MesoView, light),       AT(MesoView, shadowLift),
-            AT(MesoView, colour),     AT(MesoView, unused0),      AT(MesoView, up),          AT(MesoView, shows),
-            AT(MesoView, colours),    AT(MesoView, normals),      AT(MesoView, strayPixels), AT(MesoView, meanHeight),
-            AT(MesoView, farShadows), AT(MesoView, sectionCount), AT(MesoView, sections)}));
+            AT(MesoView, eye),         AT(MesoView, eyeX),       AT(MesoView, eyeY),       AT(MesoView, forward),
+            AT(MesoView, forwardX),    AT(MesoView, forwardY),   AT(MesoView, width),      AT(MesoView, height),
+            AT(MesoView, nodes),       AT(MesoView, withBase),   AT(MesoView, colour),     AT(MesoView, lightCount),
+            AT(MesoView, up),          AT(MesoView, shows),      AT(MesoView, colours),    AT(MesoView, normals),
+            AT(MesoView, strayPixels), AT(MesoView, meanHeight), AT(MesoView, farShadows), AT(MesoView, sectionCount),
+            AT(MesoView, shadowLift),  AT(MesoView, unused0),    AT(MesoView, unused1),    AT(MesoView, unused2),
+            AT(MesoView, lights),      AT(MesoView, sections)}));
     EXPECT_EQ(offsets.at("MesoImage"),
               (Words{AT(MesoImage, first), AT(MesoImage, width), AT(MesoImage, height), AT(MesoImage, levels)}));
 }

@@ -5,46 +5,23 @@
 
 #include <gtest/gtest.h>
 
-#include "mesostructure/method.h"
-#include "render/passes/meso_surface.h"
-#include "tests/support/meso_rays.h"
+#include "tests/support/meso_surfaces.h"
 #include "tests/support/renderer_fixture.h"
 
 namespace vcp {
 namespace {
 
 using namespace meso;
+using vcp::test::heightAsset;
+using vcp::test::mesoSurface;
+using vcp::test::plateau;
 
 constexpr uint32_t kEdge = 96;
-
-Asset heightAsset(const std::string& name, HeightMap map) {
-    Asset asset;
-    asset.name = name;
-    asset.extent = map.extent();
-    asset.heights = std::move(map);
-    return asset;
-}
-
-/// Everywhere 3/5 of the slab high.
-Asset plateau() { return heightAsset("plateau", {{8, 8}, 0.25, std::vector<uint16_t>(64, 39321)}); }
 
 class MesoSurfaces : public vcp::test::RendererFixture {
 protected:
     void SetUp() override { start(); }
 
-    static MesoSurface surfaceOf(const Asset& asset, const std::string& method, std::string_view base, double height,
-                                 double tiles = 2, glm::dvec3 place = glm::dvec3(0)) {
-        const auto shape = shapeOf(asset);
-        const auto made = buildMethod(asset, **shape, {.name = method, .cells = 8});
-        EXPECT_TRUE(made) << made.error().line();
-        BaseSurface surface = *makeBaseSurface(base, tiles);
-        for (glm::dvec3& p : surface.positions) p += place;
-        MesoSurface placed;
-        placed.arrays = std::make_shared<const MarchArrays>(*made->arrays());
-        placed.shell = *buildShell(surface, height, asset.extent);
-        placed.lift = shadowLift(*placed.arrays, tileEdge(surface));
-        return placed;
-    }
     /// Orthographic, from above, 3 units across.
     static FrameRequest fromAbove() {
         FrameRequest request;
@@ -70,7 +47,7 @@ TEST_F(MesoSurfaces, PlateauOnAQuadIsAPlane) {
     const Asset asset = plateau();
     for (const auto method : methodNames()) {
         SCOPED_TRACE(method);
-        draw({surfaceOf(asset, std::string(method), "quad", 0.5)}, fromAbove());
+        draw({mesoSurface(asset, std::string(method), "quad", 0.5)}, fromAbove());
         const auto depths = *renderer_->readDepth();
         const auto normals = *renderer_->readNormals();
         // Distance maps alone show whole cells.
@@ -103,7 +80,7 @@ TEST_F(MesoSurfaces, BordersShowTheCut) {
     request.camera.eye = {5, 0, 0}, request.camera.forward = {-1, 0, 0}, request.camera.up = {0, 0, 1};
     for (const char* method : {"boxes", "cells", "pyramid", "relief-illinois", "sphere"}) {
         SCOPED_TRACE(method);
-        draw({surfaceOf(plateau(), method, "quad", 1)}, request);
+        draw({mesoSurface(plateau(), method, "quad", 1)}, request);
         const auto depths = *renderer_->readDepth();
         const auto normals = *renderer_->readNormals();
         for (uint32_t y = 0; y < kEdge; ++y)
@@ -124,7 +101,7 @@ TEST_F(MesoSurfaces, PlateauOnASphereIsASphereWithoutHoles) {
     const double height = 0.2, radius = 1 + 0.6 * height;
     for (const char* method : {"boxes", "pyramid", "ddm-quadric", "relief-illinois"}) {
         SCOPED_TRACE(method);
-        draw({surfaceOf(asset, method, "sphere", height, 3)}, fromAbove());
+        draw({mesoSurface(asset, method, "sphere", height, 3)}, fromAbove());
         const auto depths = *renderer_->readDepth();
         const auto normals = *renderer_->readNormals();
         for (uint32_t y = 0; y < kEdge; ++y)
@@ -146,7 +123,7 @@ TEST_F(MesoSurfaces, PlateauOnASphereIsASphereWithoutHoles) {
 /// Many triangles in one place: what a ray may look at is bounded, and it is said that it was not all.
 TEST_F(MesoSurfaces, RaysThroughCoincidentPiecesAreBounded) {
     const Asset asset = plateau();
-    MesoSurface surface = surfaceOf(asset, "boxes", "quad", 0.5);
+    MesoSurface surface = mesoSurface(asset, "boxes", "quad", 0.5);
     FrameRequest request = fromAbove();
     request.shading.shadows = true;
     EXPECT_EQ(draw({surface}, request).unresolvedRays, 0u);
@@ -178,7 +155,7 @@ TEST_F(MesoSurfaces, WaysToSkipShowTheSame) {
         asset.name = asset.solid = name;
         asset.extent = meso::test::solid(name)->extent();
         const auto depthsAndWork = [&](const char* method, uint64_t& work) {
-            draw({surfaceOf(asset, method, base, 0.2)}, request);
+            draw({mesoSurface(asset, method, base, 0.2)}, request);
             const auto iterations = *renderer_->readIterations();
             work = std::accumulate(iterations.begin(), iterations.end(), work);
             return *renderer_->readDepth();
@@ -215,9 +192,9 @@ TEST_F(MesoSurfaces, NearerOfDatasetAndSurfaceIsSeen) {
     show(over.scene);
     const FrameStats alone = RendererFixture::draw(over.request);
     const auto cube = *renderer_->readPicture();
-    const FrameStats stats = draw({surfaceOf(plateau(), "boxes", "quad", 1, 2, {6, 8, 11.9}),
-                                   surfaceOf(plateau(), "boxes", "quad", 1, 2, {10, 8, 10}),
-                                   surfaceOf(plateau(), "boxes", "quad", 1, 2, {14, 8, 10})},
+    const FrameStats stats = draw({mesoSurface(plateau(), "boxes", "quad", 1, 2, {6, 8, 11.9}),
+                                   mesoSurface(plateau(), "boxes", "quad", 1, 2, {10, 8, 10}),
+                                   mesoSurface(plateau(), "boxes", "quad", 1, 2, {14, 8, 10})},
                                   over.request);
     const auto picture = *renderer_->readPicture();
     const auto depths = *renderer_->readDepth();
@@ -243,7 +220,7 @@ TEST_F(MesoSurfaces, NearerOfDatasetAndSurfaceIsSeen) {
 TEST_F(MesoSurfaces, TilesAreCutFromTheWhole) {
     const OverACube over;
     show(over.scene);
-    const std::vector<MesoSurface> surfaces = {surfaceOf(plateau(), "boxes", "sphere", 0.2, 3, {11, 8, 12})};
+    const std::vector<MesoSurface> surfaces = {mesoSurface(plateau(), "boxes", "sphere", 0.2, 3, {11, 8, 12})};
     FrameRequest request = over.request;
     for (const Projection projection : {Projection::Orthographic, Projection::Perspective}) {
         request.camera.projection = projection;
@@ -272,7 +249,7 @@ TEST_F(MesoSurfaces, AllViewsShowThemAndHearOfThem) {
     ASSERT_TRUE(view->render(over.request));
     const auto before = *view->readPicture();
     EXPECT_FALSE(view->update(over.request)->changed);
-    draw({surfaceOf(plateau(), "boxes", "quad", 1, 2, {14, 8, 10})}, over.request);
+    draw({mesoSurface(plateau(), "boxes", "quad", 1, 2, {14, 8, 10})}, over.request);
     EXPECT_TRUE(view->update(over.request)->changed);
     EXPECT_FALSE(view->update(over.request)->changed);
     ASSERT_TRUE(view->render(over.request));
@@ -288,7 +265,7 @@ TEST_F(MesoSurfaces, AllViewsShowThemAndHearOfThem) {
 
 TEST_F(MesoSurfaces, SurviveALostDevice) {
     const OverACube over;
-    const std::vector<MesoSurface> surfaces = {surfaceOf(plateau(), "boxes", "quad", 1, 2, {14, 8, 10})};
+    const std::vector<MesoSurface> surfaces = {mesoSurface(plateau(), "boxes", "quad", 1, 2, {14, 8, 10})};
     show(over.scene);
     draw(surfaces, over.request);
     const auto expected = *renderer_->readPicture();
@@ -311,7 +288,7 @@ TEST_F(MesoSurfaces, ShadowsFallBehindWhatStands) {
     request.shading.lightDirection = {0.8f, 0.2f, 0.35f};
     const auto brightness = [&](const Asset& asset, bool shadows) {
         request.shading.shadows = shadows;
-        draw({surfaceOf(asset, "boxes", "quad", 0.3)}, request);
+        draw({mesoSurface(asset, "boxes", "quad", 0.3)}, request);
         uint64_t sum = 0;
         const Picture picture = *renderer_->readPicture();
         for (const uint8_t byte : picture.rgba) sum += byte;
@@ -328,7 +305,7 @@ TEST_F(MesoSurfaces, SectionPlanesCutThem) {
     for (const char* method : {"boxes", "cells", "pyramid", "relief-illinois"}) {
         SCOPED_TRACE(method);
         FrameRequest request = fromAbove();
-        const std::vector<MesoSurface> slab{surfaceOf(plateau(), method, "quad", 0.5)};
+        const std::vector<MesoSurface> slab{mesoSurface(plateau(), method, "quad", 0.5)};
         draw(slab, request);
         const auto whole = *renderer_->readDepth();
         request.sections = {{{2, 0, 0}, 0.4}};
@@ -365,7 +342,7 @@ TEST_F(MesoSurfaces, SectionPlanesCutThem) {
 TEST_F(MesoSurfaces, TheirBytesAreTakenFromTheBudget) {
     const OverACube over;
     const Asset asset = plateau();
-    const std::vector<MesoSurface> surfaces{surfaceOf(asset, "boxes", "quad", 0.5)};
+    const std::vector<MesoSurface> surfaces{mesoSurface(asset, "boxes", "quad", 0.5)};
     const uint64_t bytes = draw(surfaces, fromAbove()).surfaceBytes;
     ASSERT_GT(bytes, 0u);
     renderer_->close();
@@ -395,8 +372,8 @@ TEST_F(MesoSurfaces, SceneWithoutMesostructurePaysNothing) {
 
 TEST_F(MesoSurfaces, OnePipelineAMethod) {
     const Asset asset = plateau();
-    const MesoSurface boxes = surfaceOf(asset, "boxes", "quad", 0.5),
-                      pyramid = surfaceOf(asset, "pyramid", "quad", 0.5);
+    const MesoSurface boxes = mesoSurface(asset, "boxes", "quad", 0.5),
+                      pyramid = mesoSurface(asset, "pyramid", "quad", 0.5);
     const uint32_t one = draw({boxes}, fromAbove()).pipelines;
     EXPECT_EQ(draw({boxes, boxes}, fromAbove()).pipelines, one);
     EXPECT_EQ(draw({boxes, pyramid}, fromAbove()).pipelines, one + 1);
@@ -413,7 +390,7 @@ TEST_F(MesoSurfaces, TexturesLieOverTheTile) {
     std::vector<glm::vec4> texels;
     for (int j = 0; j < 4; ++j)
         for (int i = 0; i < 4; ++i) texels.emplace_back(float(i) / 3, float(j) / 3, 0.5f, 1);
-    MesoSurface surface = surfaceOf(plateau(), "boxes", "quad", 0.5);
+    MesoSurface surface = mesoSurface(plateau(), "boxes", "quad", 0.5);
     surface.colour = glm::vec3(1);
     draw({surface}, fromAbove());
     const Picture white = *renderer_->readPicture();
@@ -446,7 +423,7 @@ TEST_F(MesoSurfaces, TexturesLieOverTheTile) {
 TEST_F(MesoSurfaces, TexturesAreAveragedAsLight) {
     std::vector<glm::vec4> texels;
     for (int i = 0; i < 64 * 64; ++i) texels.emplace_back(float((i + i / 64) % 2));
-    MesoSurface surface = surfaceOf(plateau(), "boxes", "quad", 0.05, 32);
+    MesoSurface surface = mesoSurface(plateau(), "boxes", "quad", 0.05, 32);
     surface.colour = glm::vec3(1);
     draw({surface}, fromAbove());
     const Picture white = *renderer_->readPicture();
@@ -470,7 +447,7 @@ TEST_F(MesoSurfaces, NormalTexturesBendWhatIsThere) {
         return std::make_shared<const MesoTexture>(makeMesoTexture({2, 2}, std::vector<glm::vec4>(4, glm::vec4(n, 0))));
     };
     const auto normalsOf = [&](std::string_view base, const std::shared_ptr<const MesoTexture>& normals) {
-        MesoSurface surface = surfaceOf(plateau(), "pyramid", base, 0.1, 3);
+        MesoSurface surface = mesoSurface(plateau(), "pyramid", base, 0.1, 3);
         surface.normals = normals;
         draw({surface}, fromAbove());
         return *renderer_->readNormals();
@@ -522,7 +499,7 @@ BaseSurface denseStrip() {
 }
 
 TEST_F(MesoSurfaces, DenseBasesHaveNoGapsAlongTheirWalls) {
-    MesoSurface surface = surfaceOf(plateau(), "boxes", "quad", 0.5);
+    MesoSurface surface = mesoSurface(plateau(), "boxes", "quad", 0.5);
     surface.shell = *buildShell(denseStrip(), 0.0007, plateau().extent);
     surface.withBase = false;
     FrameRequest request = fromAbove();
@@ -563,7 +540,7 @@ TEST_F(MesoSurfaces, FromFarTheMeanLightIsSeenWithoutMarching) {
                     asset = heightAsset(name, *makeHeightField(name, 64, 1));
                 // A tile is narrower than a pixel by no simple part, and the slab less high than half of one.
                 const double edge = 0.83 * 3.0 / kEdge, tall = std::min(1.0, 0.4 / asset.extent.z);
-                MesoSurface surface = surfaceOf(asset, "boxes", "quad", tall * edge * asset.extent.z, 2 / edge);
+                MesoSurface surface = mesoSurface(asset, "boxes", "quad", tall * edge * asset.extent.z, 2 / edge);
                 const auto shape = shapeOf(asset);
                 surface.far = std::make_shared<const Appearance>(appearanceOf(**shape, tall));
                 FrameRequest request = fromAbove();
@@ -607,7 +584,7 @@ TEST_F(MesoSurfaces, FromFarTheMeanLightIsSeenWithoutMarching) {
 }
 
 TEST_F(MesoSurfaces, NearbyAllIsMarched) {
-    MesoSurface surface = surfaceOf(heightAsset("fbm", *makeHeightField("fbm", 64, 1)), "boxes", "torus", 0.1);
+    MesoSurface surface = mesoSurface(heightAsset("fbm", *makeHeightField("fbm", 64, 1)), "boxes", "torus", 0.1);
     FrameRequest request = fromAbove();
     request.shading.shadows = true;
     draw({surface}, request);
@@ -623,7 +600,7 @@ TEST_F(MesoSurfaces, WhatRaysComeThroughIsMarchedFromFar) {
     Asset asset;
     asset.name = asset.solid = "ball";
     asset.extent = meso::test::solid("ball")->extent();
-    MesoSurface surface = surfaceOf(asset, "boxes", "quad", 0.01, 64);
+    MesoSurface surface = mesoSurface(asset, "boxes", "quad", 0.01, 64);
     surface.far = std::make_shared<const Appearance>(appearanceOf(*meso::test::solid("ball"), 0.5, 64));
     surface.withBase = false;
     EXPECT_EQ(draw({surface}, fromAbove()).farHits, 0u);

@@ -6,7 +6,7 @@
 
 #include "mesostructure/method.h"
 #include "mesostructure/solids.h"
-#include "render/passes/meso_surface.h"
+#include "render/meso_surface.h"
 #include "tests/support/renderer_fixture.h"
 
 namespace vcp {

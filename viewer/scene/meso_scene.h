@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "mesostructure/method.h"
-#include "render/passes/meso_surface.h"
+#include "render/meso_surface.h"
 #include "viewer/camera/orbit_camera.h"
 
 namespace vcp {

@@ -3,7 +3,6 @@
 #include <atomic>
 #include <fstream>
 
-#include "render/passes/meso_surface.h"
 #include "tests/support/host_comparison.h"
 
 namespace vcp {
@@ -337,7 +336,7 @@ TEST_F(HostRendererTest, RefusesWhatItDoesNotDraw) {
         asked.shading.mode = mode;
         EXPECT_TRUE(refused(asked));
     }
-    const std::vector<MesoSurface> surfaces(1);
+    const std::vector<MesoSurface> surfaces(1);  // without arrays, as those that are remeshed
     EXPECT_EQ(host_->setSurfaces(surfaces).error().code, ErrorCode::Unsupported);
     EXPECT_FALSE(host_->open({{scene.dataset, scene.source, {}}}, surfaces));
     auto paper = std::make_shared<Dataset>(*scene.dataset);

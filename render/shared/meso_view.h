@@ -1,4 +1,4 @@
-// What the mesostructure shaders are handed with a picture (shared/meso_layout.h), in C++.
+// What the mesostructure shaders are handed with a picture (meso_layout.h), in C++.
 #pragma once
 
 #include <cstddef>
@@ -15,6 +15,6 @@ using vec4 = glm::vec4;
 
 #include "render/shared/meso_layout.h"
 
-static_assert(sizeof(MesoView) == 304 && offsetof(MesoView, width) == 96);
+static_assert(sizeof(MesoView) == 368 && offsetof(MesoView, width) == 96);
 
 }  // namespace vcp::frame

@@ -1,0 +1,75 @@
+#include "render/meso_look.h"
+
+#include <glm/geometric.hpp>
+#include <glm/gtc/packing.hpp>
+#include <glm/vec4.hpp>
+
+#include "render/frame_setup.h"
+
+namespace vcp {
+
+namespace {
+
+glm::vec4 toVec4(glm::dvec3 v) { return {glm::vec3(v), 0}; }
+
+uint32_t shownIn(ShadingMode mode) {
+    switch (mode) {
+        case ShadingMode::Normals:
+            return frame::kMesoShowNormals;
+        case ShadingMode::Unlit:
+            return frame::kMesoShowUnlit;
+        case ShadingMode::Steps:
+            return frame::kMesoShowHeat;
+        default:
+            return frame::kMesoShowLit;
+    }
+}
+
+}  // namespace
+
+MesoLook mesoLook(const MesoSurface& surface) {
+    MesoLook look;
+    if (surface.far)
+        for (const glm::vec4& texel : surface.far->texels) look.looks.push_back(glm::packHalf4x16(texel));
+    const auto add = [&](const MesoTexture* texture, frame::MesoImage& where, uint32_t bit) {
+        if (texture == nullptr) return;
+        where = {uint32_t(look.looks.size()), texture->size.x, texture->size.y, texture->levels};
+        look.looks.insert(look.looks.end(), texture->texels.begin(), texture->texels.end());
+        if (texture->levels > 0) look.textures |= bit;
+    };
+    add(surface.colours.get(), look.view.colours, frame::kMesoColours);
+    add(surface.normals.get(), look.view.normals, frame::kMesoNormals);
+    // A surface that rays may come through must be marched.
+    look.isFarDrawn = surface.far && (surface.withBase || surface.far->isOpaque);
+    look.view.meanHeight = look.isFarDrawn ? float(surface.far->height) : 0.0f;
+    look.view.nodes = surface.shell.nodes;
+    look.view.withBase = surface.withBase ? 1 : 0;
+    look.view.shadowLift = float(surface.lift);
+    look.view.colour = surface.colour;
+    return look;
+}
+
+void setPicture(frame::MesoView& view, glm::dvec3 origin, const FrameRequest& request) {
+    const PictureRays rays = pictureRays(request);
+    view.eye = toVec4(rays.origin - origin), view.eyeX = toVec4(rays.originPerX), view.eyeY = toVec4(rays.originPerY);
+    view.forward = toVec4(rays.direction), view.forwardX = toVec4(rays.directionPerX),
+    view.forwardY = toVec4(rays.directionPerY);
+    view.width = request.width, view.height = request.height;
+    const PictureTile whole = wholePicture(request);
+    const CameraBasis basis = cameraBasis(request.camera, whole.fullWidth, whole.fullHeight);
+    view.lightCount = 0;
+    for (const DirectedLight& light : lightsOf(request.shading))
+        view.lights[view.lightCount++] = glm::vec4(glm::vec3(towardsLight(light, basis)), light.strength);
+    view.up = lightDirections(request, basis).sky;
+    view.strayPixels = float(request.errorPixels), view.farShadows = request.shading.shadows ? 1 : 0;
+    view.shows = shownIn(request.shading.mode);
+    view.sectionCount = uint32_t(request.sections.size());
+    for (size_t i = 0; i < rays.sections.size(); ++i) {
+        const glm::dvec3 normal(rays.sections[i]);
+        view.sections[i] = glm::dvec4(normal, glm::dot(normal, origin) - rays.sections[i].w);
+    }
+}
+
+bool hasMesoShadows(const Shading& shading) { return shading.shadows && shownIn(shading.mode) == frame::kMesoShowLit; }
+
+}  // namespace vcp

@@ -1,0 +1,30 @@
+// What drawing a surface with mesostructure takes besides its arrays and its shell, for the passes as for the host.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include <glm/vec3.hpp>
+
+#include "render/frame_request.h"
+#include "render/meso_surface.h"
+#include "render/shared/meso_view.h"
+
+namespace vcp {
+
+/// How a surface looks in all pictures.
+struct MesoLook {
+    frame::MesoView view{};       ///< what does not depend on the picture
+    std::vector<uint64_t> looks;  ///< words of what is seen from far, followed by the textures
+    uint32_t textures = 0;        ///< frame::kMesoColours, kMesoNormals
+    bool isFarDrawn = false;      ///< it is seen from far where it is small
+};
+MesoLook mesoLook(const MesoSurface& surface);
+
+/// Fills what depends on the picture. `origin`: of the surface's space in the world.
+void setPicture(frame::MesoView& view, glm::dvec3 origin, const FrameRequest& request);
+
+/// Whether rays of light go from and through the surfaces of a picture.
+bool hasMesoShadows(const Shading& shading);
+
+}  // namespace vcp

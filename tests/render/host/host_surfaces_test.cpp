@@ -1,0 +1,361 @@
+// Surfaces with mesostructure by the host against those by the shaders, pixel by pixel.
+#include <atomic>
+#include <numeric>
+
+#include <glm/geometric.hpp>
+
+#include "mesostructure/appearance.h"
+#include "tests/support/host_comparison.h"
+#include "tests/support/meso_surfaces.h"
+
+namespace vcp {
+namespace {
+
+using test::Difference;
+using test::heightAsset;
+using test::mesoSurface;
+using test::plateau;
+using test::solidAsset;
+
+constexpr uint32_t kWidth = 144, kHeight = 112;
+
+meso::Asset relief() { return heightAsset("fbm", *meso::makeHeightField("fbm", 64, 1)); }
+
+/// Perspective from a side, close, and orthographic from above.
+std::vector<Camera> views() {
+    const auto towards = [](glm::dvec3 eye, glm::dvec3 at) {
+        return Camera{.eye = eye, .forward = glm::normalize(at - eye), .up = {0, 0, 1}};
+    };
+    return {towards({2.1, -1.7, 1.4}, {0, 0, 0.1}),
+            towards({0.31, -0.6, 0.42}, {0.2, 0.1, 0.1}),
+            {.eye = {0, 0, 5},
+             .forward = {0, 0, -1},
+             .up = {0, 1, 0},
+             .projection = Projection::Orthographic,
+             .orthographicHeight = 2.7}};
+}
+
+class HostSurfaces : public test::CastByRendererTest {
+protected:
+    static FrameRequest lookFrom(const Camera& camera) {
+        FrameRequest request = test::requestOf(camera, kWidth, kHeight);
+        request.shading.lightFollowsCamera = false;
+        request.shading.lightDirection = {0.8f, 0.2f, 0.35f};
+        return request;
+    }
+    void setSurfaces(const std::vector<MesoSurface>& surfaces) {
+        ASSERT_TRUE(host_->setSurfaces(surfaces));
+        ASSERT_TRUE(renderer_->setSurfaces(surfaces));
+    }
+    /// Compares what both draw; depths by a ten-thousandth of the surfaces' 2 units.
+    Difference differenceOf(const FrameRequest& request, uint32_t samples = 1) {
+        const test::Planes host = test::drawnBy(*host_, request, samples),
+                           device = test::drawnBy(*renderer_, request, samples);
+        return test::compare(host, device, 0.2);
+    }
+    /// 4 of 1000 hits may differ where a ray passes an edge or a silhouette of texels and cells.
+    static void expectAlike(const Difference& d) {
+        EXPECT_GT(d.hits, 1000u);
+        EXPECT_LE(double(d.state + d.depth + d.normal + d.colour), 4e-3 * double(d.hits))
+            << d.state << " states, " << d.depth << " depths, " << d.normal << " normals, " << d.colour
+            << " colours of " << d.hits << " hits";
+        std::printf("%llu states, %llu depths, %llu normals, %llu colours of %llu hits\n", (unsigned long long)d.state,
+                    (unsigned long long)d.depth, (unsigned long long)d.normal, (unsigned long long)d.colour,
+                    (unsigned long long)d.hits);
+    }
+};
+
+TEST_F(HostSurfaces, EveryMethodFromEveryView) {
+    for (const auto method : meso::methodNames()) {
+        SCOPED_TRACE(method);
+        Difference all;
+        const bool ofHeights = meso::methodFits(method, relief());
+        for (const char* base : {"quad", "torus"}) {
+            const meso::Asset asset = ofHeights ? relief() : solidAsset("beads");
+            setSurfaces({mesoSurface(asset, std::string(method), base, 0.2)});
+            for (const Camera& camera : views())
+                for (const bool shadows : {false, true}) {
+                    FrameRequest request = lookFrom(camera);
+                    request.shading.shadows = shadows;
+                    all += differenceOf(request);
+                }
+        }
+        expectAlike(all);
+    }
+}
+
+TEST_F(HostSurfaces, SolidsWithAndWithoutTheirBase) {
+    for (const char* name : {"beads", "weave"})
+        for (const bool withBase : {false, true}) {
+            SCOPED_TRACE(testing::Message() << name << withBase);
+            Difference all;
+            for (const char* method : {"boxes", "ddm", "sphere", "gdm-safe"}) {
+                MesoSurface surface = mesoSurface(solidAsset(name), method, "cylinder", 0.25);
+                surface.withBase = withBase;
+                setSurfaces({surface});
+                for (const Camera& camera : views()) {
+                    FrameRequest request = lookFrom(camera);
+                    request.shading.shadows = true;
+                    all += differenceOf(request);
+                }
+            }
+            expectAlike(all);
+        }
+}
+
+TEST_F(HostSurfaces, ModesSectionsLightsTexturesAndFar) {
+    std::vector<glm::vec4> colours, normals;
+    for (int i = 0; i < 16 * 16; ++i) {
+        colours.emplace_back(float(i % 16) / 15, float(i / 16) / 15, 0.4f, 1);
+        normals.emplace_back(0.3f * float(i % 3 - 1), 0.2f * float(i % 5 - 2), 1, 0);
+    }
+    MesoSurface textured = mesoSurface(relief(), "pyramid", "sphere", 0.2);
+    textured.colours = std::make_shared<const MesoTexture>(makeMesoTexture({16, 16}, colours));
+    textured.normals = std::make_shared<const MesoTexture>(makeMesoTexture({16, 16}, normals));
+    MesoSurface small = mesoSurface(relief(), "boxes", "quad", 0.02, 200, {0.5, 0.3, -0.2});
+    small.far = std::make_shared<const meso::Appearance>(appearanceOf(**shapeOf(relief()), 0.5, 64));
+    setSurfaces({textured, small});
+    const auto compared = [&](const auto& change, uint32_t samples = 1) {
+        Difference all;
+        for (const Camera& camera : views()) {
+            FrameRequest request = lookFrom(camera);
+            change(request);
+            all += differenceOf(request, samples);
+        }
+        expectAlike(all);
+    };
+    for (const ShadingMode mode : {ShadingMode::Lit, ShadingMode::Clay, ShadingMode::Unlit, ShadingMode::Normals,
+                                   ShadingMode::Level, ShadingMode::Error})
+        for (const bool shadows : {false, true}) {
+            SCOPED_TRACE(testing::Message() << int(mode) << shadows);
+            compared([&](FrameRequest& request) { request.shading.mode = mode, request.shading.shadows = shadows; });
+        }
+    for (const bool shadows : {false, true}) {
+        SCOPED_TRACE(testing::Message() << "lights" << shadows);
+        compared([&](FrameRequest& request) {
+            request.shading.shadows = shadows;
+            request.shading.lightStrength = 0.6f;
+            request.shading.moreLights = {{false, {-0.5f, 0.4f, 0.3f}, 0.5f}, {true, {0, 0, 1}, 0.3f}};
+        });
+    }
+    SCOPED_TRACE("sections");
+    compared([&](FrameRequest& request) {
+        request.shading.shadows = true;
+        request.sections = {{{0.3, 0.1, -1}, -0.4}, {{1, 0, 0}, -0.6}};
+    });
+    SCOPED_TRACE("samples");
+    compared([&](FrameRequest&) {}, 4);
+    const FrameRequest from = lookFrom(views()[0]);
+    ASSERT_TRUE(host_->settle(from));
+    EXPECT_GT(host_->render(from)->farHits, 100u);
+    const auto iterations = *host_->readIterations();
+    EXPECT_GT(std::accumulate(iterations.begin(), iterations.end(), uint64_t{0}), 1000u);
+}
+
+TEST_F(HostSurfaces, NearerOfDatasetAndSurface) {
+    const auto scene = test::cubeScene(0);
+    const std::vector<MesoSurface> surfaces{mesoSurface(relief(), "boxes", "torus", 0.3, 2, {11.5, 8, 11})};
+    ASSERT_TRUE(host_->open({{scene.dataset, scene.source, {}}}, surfaces));
+    ASSERT_TRUE(renderer_->open({{scene.dataset, scene.source, {}}}, surfaces));
+    ASSERT_TRUE(casting_->open({{scene.dataset, scene.source, {}}}, surfaces));
+    FrameRequest request = test::requestOf(
+        {.eye = {20, -4, 19}, .forward = glm::normalize(glm::dvec3(-10, 12, -9)), .up = {0, 0, 1}}, 320, 240);
+    const Difference d = differenceOf(request);
+    test::expectFew(d);
+    // The renderer whose device is the processor draws the same, byte by byte, by no shader, and knows what is hit.
+    const test::Planes host = test::drawnBy(*host_, request), cast = test::drawnBy(*casting_, request);
+    EXPECT_EQ(host.picture, cast.picture);
+    EXPECT_EQ(host.depth, cast.depth);
+    EXPECT_EQ(casting_->render(request)->pipelines, 0u);
+    EXPECT_TRUE(casting_->render(request)->onHost);
+    uint64_t onSurface = 0, onDataset = 0;
+    ASSERT_TRUE(renderer_->render(request));
+    for (uint32_t y = 1; y < request.height; y += 7)
+        for (uint32_t x = 1; x < request.width; x += 7) {
+            const auto a = *casting_->pick(x, y), b = *renderer_->pick(x, y);
+            ASSERT_EQ(a.has_value(), b.has_value());
+            if (!a) continue;
+            EXPECT_EQ(a->onSurface, b->onSurface);
+            (a->onSurface ? onSurface : onDataset) += 1;
+        }
+    EXPECT_GT(onSurface, 20u);
+    EXPECT_GT(onDataset, 20u);
+}
+
+TEST_F(HostSurfaces, TilesAreCutFromTheWholeAndBytesFromTheBudget) {
+    const std::vector<MesoSurface> surfaces{mesoSurface(relief(), "boxes", "sphere", 0.2)};
+    setSurfaces(surfaces);
+    FrameRequest request = lookFrom(views()[0]);
+    const Picture whole = test::drawnBy(*host_, request).picture;
+    request.width = 40, request.height = 24;
+    request.tile = PictureTile{48, 32, kWidth, kHeight};
+    const Picture tile = test::drawnBy(*host_, request).picture;
+    int largest = 0;
+    for (uint32_t y = 0; y < 24; ++y)
+        for (uint32_t i = 0; i < 160; ++i)
+            largest = std::max(
+                largest, std::abs(int(tile.rgba[y * 160 + i]) - int(whole.rgba[4 * ((y + 32) * kWidth + 48) + i])));
+    EXPECT_LE(largest, 2);
+    ASSERT_TRUE(host_->settle(request));
+    const uint64_t bytes = host_->render(request)->surfaceBytes;
+    EXPECT_GT(bytes, 1000u);
+    const auto cube = test::cubeScene(0);
+    RendererOptions options;
+    options.budgetBytes = (1 << 20) + bytes - 1;
+    host_ = HostRenderer::create(options).value();
+    EXPECT_EQ(host_->open({{cube.dataset, cube.source, {}}}, surfaces).error().code, ErrorCode::Limit);
+    EXPECT_TRUE(host_->open({{cube.dataset, cube.source, {}}}, {}));
+    EXPECT_EQ(host_->setSurfaces(surfaces).error().code, ErrorCode::Limit);
+    options.budgetBytes += 1;
+    host_ = HostRenderer::create(options).value();
+    EXPECT_TRUE(host_->open({{cube.dataset, cube.source, {}}}, surfaces));
+}
+
+TEST_F(HostSurfaces, IsCancelledBetweenTiles) {
+    setSurfaces({mesoSurface(plateau(), "boxes", "quad", 0.2)});
+    const FrameRequest request = lookFrom(views()[0]);
+    ASSERT_TRUE(host_->settle(request));
+    std::atomic<int> asked = 0;
+    const auto stopped = host_->render(request, [&] { return ++asked > 3; });
+    EXPECT_EQ(stopped.error().code, ErrorCode::Cancelled);
+    EXPECT_FALSE(host_->readPicture());
+    EXPECT_TRUE(host_->render(request));
+}
+
+/// A ball over a slab, by closed forms: the slab fills |x|, |y| <= 1 and 0 <= z <= kTop.
+struct BallOverSlab {
+    static constexpr double kTop = 0.3, kUnit = 0.05, kFar = 1e30;
+    glm::dvec3 middle;
+    double radius = 0.41 * 16 * kUnit;
+
+    [[nodiscard]] Similarity placement() const {
+        return {.rotation = {1, 0, 0, 0},
+                .scale = kUnit,
+                .translation = middle - kUnit * 16 * glm::dvec3(0.503, 0.497, 0.501)};
+    }
+    [[nodiscard]] double ball(glm::dvec3 o, glm::dvec3 d) const {
+        const double b = glm::dot(d, o - middle), root = b * b - glm::dot(o - middle, o - middle) + radius * radius;
+        const double t = root < 0 ? -1 : -b - std::sqrt(root);
+        return t > 0 ? t : kFar;
+    }
+    static double slab(glm::dvec3 o, glm::dvec3 d) {
+        double enter = 0, leave = kFar;
+        const glm::dvec3 low(-1, -1, 0), high(1, 1, kTop);
+        for (int axis = 0; axis < 3; ++axis) {
+            const double a = (low[axis] - o[axis]) / d[axis], b = (high[axis] - o[axis]) / d[axis];
+            enter = std::max(enter, std::min(a, b)), leave = std::min(leave, std::max(a, b));
+        }
+        return enter < leave ? enter : kFar;
+    }
+};
+
+/// Counts of pixels by what is seen and whether the other stands in its light, and those that are drawn otherwise.
+struct ShadowCounts {
+    uint64_t onBall[2] = {}, onSlab[2] = {};
+    uint64_t wrong = 0, doubtful = 0;
+};
+
+ShadowCounts countShadows(const BallOverSlab& truth, const FrameRequest& request, const Picture& lit,
+                          const Picture& shadowed) {
+    ShadowCounts counts;
+    const glm::dvec3 light = glm::normalize(glm::dvec3(request.shading.lightDirection));
+    for (uint32_t y = 0; y < request.height; ++y)
+        for (uint32_t x = 0; x < request.width; ++x) {
+            const CameraRay ray = cameraRay(request.camera, request.width, request.height, x + 0.5, y + 0.5);
+            // What is seen, and its light, are clear where the ray and its neighbours a little aside agree.
+            const auto seen = [&](glm::dvec2 aside) {
+                const CameraRay beside =
+                    cameraRay(request.camera, request.width, request.height, x + 0.5 + aside.x, y + 0.5 + aside.y);
+                const double ball = truth.ball(beside.origin, beside.direction),
+                             slab = truth.slab(beside.origin, beside.direction);
+                if (std::min(ball, slab) >= truth.kFar) return 0;
+                const glm::dvec3 at = beside.origin + std::min(ball, slab) * beside.direction;
+                if (ball < slab)
+                    return glm::dot(at - truth.middle, light) <= 0 ? 1 : truth.slab(at, light) < truth.kFar ? 3 : 2;
+                const bool isTop = std::abs(at.z - truth.kTop) < 1e-9;
+                return !isTop || light.z <= 0 ? 4 : truth.ball(at, light) < truth.kFar ? 6 : 5;
+            };
+            const int what = seen({0, 0});
+            bool isClear = true;
+            for (int i = 0; i < 8; ++i)
+                isClear = isClear && seen({1.5 * std::cos(i * M_PI / 4), 1.5 * std::sin(i * M_PI / 4)}) == what;
+            if (!isClear) {
+                ++counts.doubtful;
+                continue;
+            }
+            // Sides of the slab, and what is turned away, say nothing.
+            if (what == 0 || what == 1 || what == 4) continue;
+            const size_t pixel = size_t{y} * request.width + x;
+            const bool isDark = what == 3 || what == 6;
+            counts.wrong += (test::channelsApart(lit, shadowed, pixel) > 2) == isDark ? 0 : 1;
+            ++(what < 4 ? counts.onBall : counts.onSlab)[isDark ? 1 : 0];
+        }
+    return counts;
+}
+
+TEST_F(HostSurfaces, ScanAndReliefCastShadowsOnEachOther) {
+    const auto scene = test::sphereScene(1);
+    const struct {
+        BallOverSlab truth;
+        Camera camera;
+        glm::vec3 light;
+    } cases[] = {{{{0.1, -0.05, 0.75}},
+                  {.eye = {1.5, -2.2, 2.4}, .forward = glm::normalize(glm::dvec3(-1.5, 2.2, -2)), .up = {0, 0, 1}},
+                  {0.45f, 0.3f, 0.9f}},
+                 {{{0.8, -0.05, 0.75}},
+                  {.eye = {2.4, -2.2, 0.1}, .forward = glm::normalize(glm::dvec3(-1.6, 2.2, 0.5)), .up = {0, 0, 1}},
+                  {0.75f, -0.1f, -1.0f}}};
+    for (const auto& [truth, camera, light] : cases) {
+        const std::vector<MesoSurface> surfaces{mesoSurface(plateau(), "boxes", "quad", 0.5)};
+        ASSERT_TRUE(host_->open({{scene.dataset, scene.source, truth.placement()}}, surfaces));
+        FrameRequest request = lookFrom(camera);
+        request.width = 400, request.height = 300;
+        request.shading.lightDirection = light;
+        const Picture lit = test::drawnBy(*host_, request).picture;
+        request.shading.shadows = true;
+        const Picture shadowed = test::drawnBy(*host_, request).picture;
+        const ShadowCounts counts = countShadows(truth, request, lit, shadowed);
+        EXPECT_EQ(counts.wrong, 0u);
+        const bool fromAbove = light.z > 0;
+        EXPECT_GT(counts.onSlab[fromAbove ? 1 : 0] + counts.onBall[fromAbove ? 0 : 1], 1000u);
+        EXPECT_GT(fromAbove ? counts.onSlab[1] : counts.onBall[1], 1000u);
+        EXPECT_GT(counts.onBall[0], 1000u);
+        EXPECT_LT(counts.doubtful, 12000u);
+        std::printf("ball %llu lit %llu dark, slab %llu lit %llu dark, %llu doubtful, %llu wrong\n",
+                    (unsigned long long)counts.onBall[0], (unsigned long long)counts.onBall[1],
+                    (unsigned long long)counts.onSlab[0], (unsigned long long)counts.onSlab[1],
+                    (unsigned long long)counts.doubtful, (unsigned long long)counts.wrong);
+    }
+}
+
+/// With rays into the sky, a scan stands in a hollow of light on the relief, and is darker next to it.
+TEST_F(HostSurfaces, ScanAndReliefOccludeEachOther) {
+    const auto scene = test::sphereScene(1);
+    const BallOverSlab truth{{0.1, -0.05, 0.65}};
+    FrameRequest request =
+        lookFrom({.eye = {1.5, -2.2, 1.4}, .forward = glm::normalize(glm::dvec3(-1.5, 2.2, -1)), .up = {0, 0, 1}});
+    request.shading.occlusionRays = 16;
+    request.shading.occlusionRadius = 0.5;
+    const std::vector<MesoSurface> surfaces{mesoSurface(plateau(), "boxes", "quad", 0.5)};
+    const std::vector<PlacedDataset> ball{{scene.dataset, scene.source, truth.placement()}};
+    ASSERT_TRUE(host_->open(ball, surfaces));
+    const test::Planes both = test::drawnBy(*host_, request);
+    ASSERT_TRUE(host_->open(ball, {}));
+    const test::Planes ballAlone = test::drawnBy(*host_, request);
+    ASSERT_TRUE(host_->open({}, surfaces));
+    const test::Planes slabAlone = test::drawnBy(*host_, request);
+    uint64_t darker[2] = {}, brighter = 0;
+    for (size_t i = 0; i < both.depth.size(); ++i) {
+        if (!std::isfinite(both.depth[i])) continue;
+        const bool onBall = both.depth[i] == ballAlone.depth[i];
+        const int apart = int((onBall ? ballAlone : slabAlone).picture.rgba[4 * i]) - int(both.picture.rgba[4 * i]);
+        darker[onBall ? 1 : 0] += apart > 4 ? 1 : 0;
+        brighter += apart < -1 ? 1 : 0;
+    }
+    EXPECT_GT(darker[0], 300u);
+    EXPECT_GT(darker[1], 100u);
+    EXPECT_EQ(brighter, 0u);
+}
+
+}  // namespace
+}  // namespace vcp
