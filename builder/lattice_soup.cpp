@@ -22,14 +22,6 @@ glm::i32vec3 roundTo(glm::dvec3 p, int step) { return glm::i32vec3(p / double(st
 // area are left out, and rays in single precision miss long needles by about as much.
 constexpr int kMostRoundings = 3;
 
-/// Returns the edge of a cell in texture coordinates, from the ratio of the triangle's areas.
-float footprintOf(const LatticeTriangle& t, const glm::vec2 (&uv)[3]) {
-    const glm::dvec3 u = glm::dvec3(t.corner[1] - t.corner[0]), v = glm::dvec3(t.corner[2] - t.corner[0]);
-    const double area = glm::length(glm::cross(u, v)) / (double(kLatticePerCell) * kLatticePerCell);
-    const glm::dvec2 p = glm::dvec2(uv[1]) - glm::dvec2(uv[0]), q = glm::dvec2(uv[2]) - glm::dvec2(uv[0]);
-    return area > 0 ? float(std::sqrt(std::abs(p.x * q.y - p.y * q.x) / area)) : 0.0f;
-}
-
 }  // namespace
 
 LatticeSnapper::LatticeSnapper(const GridFrame& frame, MaterialColours* colours, bool vertexColours, FinestPages pages)
@@ -106,8 +98,10 @@ int LatticeSnapper::cut(const Piece& piece, Piece (&pieces)[4]) const {
 }
 
 void LatticeSnapper::paint(Piece& piece) const {
+    // A corner that several triangles meet in gets the mean of what each says of it (meshOf).
+    const TextureFootprint footprint = TextureFootprint::ofCorner(piece.uv);
     for (int i = 0; i < 3; ++i) {
-        const Rgba8 painted = colours_->at(piece.material, piece.uv[i], piece.footprint);
+        const Rgba8 painted = colours_->at(piece.material, placeOfCorner(piece.uv, i), footprint);
         piece.triangle.colour[i] = vertexColours_ ? modulate(piece.triangle.colour[i], painted) : painted;
     }
 }
@@ -138,7 +132,6 @@ LatticeSnapper::Piece LatticeSnapper::snap(const WorldTriangle<Real>& triangle) 
         piece.uv[i] = triangle.uv[i];
     }
     piece.material = triangle.material;
-    if (colours_ && piece.material > 0) piece.footprint = footprintOf(t, piece.uv);
     return piece;
 }
 

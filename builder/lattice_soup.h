@@ -41,7 +41,6 @@ private:
         int cuts;
         glm::vec2 uv[3];
         uint32_t material;
-        float footprint;  ///< edge of a cell in texture coordinates
     };
 
     /// A corner of a piece, or the middle of an edge.

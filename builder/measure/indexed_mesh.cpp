@@ -21,7 +21,8 @@ void addCoordinates(const MeshChunk& chunk, size_t before, IndexedMesh& mesh) {
     if (mesh.coordinates.size() != mesh.triangles.size()) mesh.coordinates = {};
 }
 
-Result<void> append(MeshStream& stream, const std::string& name, const LoadOptions& options, IndexedMesh& mesh) {
+Result<void> append(MeshStream& stream, const std::string& name, const LoadOptions& options, IndexedMesh& mesh,
+                    size_t file = 0) {
     const uint64_t base = mesh.positions.size();
     const auto fail = [&](ErrorCode code, std::string message) {
         return Error{.code = code, .message = std::move(message), .file = name};
@@ -29,6 +30,7 @@ Result<void> append(MeshStream& stream, const std::string& name, const LoadOptio
     for (MeshChunk chunk;;) {
         VCP_TRY_ASSIGN(const bool more, stream.next(chunk));
         if (!more) return {};
+        if (options.chunk) options.chunk(file, stream, chunk);
         if (mesh.positions.size() + chunk.positions.size() > options.mostPositions ||
             mesh.triangles.size() + chunk.triangles.size() > options.mostTriangles)
             return fail(ErrorCode::Limit,
@@ -65,11 +67,11 @@ Result<IndexedMesh> loadMesh(const std::filesystem::path& path, const LoadOption
     return loadMesh(*stream, path.string(), options);
 }
 
-Result<IndexedMesh> loadMesh(std::span<const std::filesystem::path> paths) {
+Result<IndexedMesh> loadMesh(std::span<const std::filesystem::path> paths, const LoadOptions& options) {
     IndexedMesh mesh;
-    for (const auto& path : paths) {
-        VCP_TRY_ASSIGN(const auto stream, openMesh(path));
-        VCP_TRY(append(*stream, path.string(), {}, mesh));
+    for (size_t file = 0; file < paths.size(); ++file) {
+        VCP_TRY_ASSIGN(const auto stream, openMesh(paths[file]));
+        VCP_TRY(append(*stream, paths[file].string(), options, mesh, file));
     }
     if (mesh.triangles.empty())
         return Error{.code = ErrorCode::InvalidInput,

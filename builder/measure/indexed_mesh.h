@@ -38,6 +38,9 @@ struct LoadOptions {
     uint64_t mostPositions = std::numeric_limits<uint32_t>::max();
     /// Takes the part of the file that is read, from 0 to 1; returning false cancels.
     std::function<bool(double fraction)> progress = {};
+    /// Takes each chunk as it is read: what it holds beyond positions and triangles is forgotten then. `file`: its
+    /// number among those that are joined.
+    std::function<void(size_t file, const MeshStream& stream, const MeshChunk& chunk)> chunk = {};
 };
 
 /// Reads a mesh to its end. `name` stands for it in errors. Errors: what the reader says; InvalidInput where there is
@@ -46,6 +49,6 @@ Result<IndexedMesh> loadMesh(MeshStream& stream, const std::string& name, const 
 /// Reads a file through openMesh.
 Result<IndexedMesh> loadMesh(const std::filesystem::path& path, const LoadOptions& options = {});
 /// Reads meshes and joins them. Errors: Limit at 2^32 vertices.
-Result<IndexedMesh> loadMesh(std::span<const std::filesystem::path> paths);
+Result<IndexedMesh> loadMesh(std::span<const std::filesystem::path> paths, const LoadOptions& options = {});
 
 }  // namespace vcp

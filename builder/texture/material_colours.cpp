@@ -11,7 +11,7 @@ bool MaterialColours::hasImages() const {
                        [](const Material& material) { return material.image.exists(); });
 }
 
-Rgba8 MaterialColours::at(uint32_t material, glm::vec2 uv, float footprint) {
+Rgba8 MaterialColours::at(uint32_t material, glm::vec2 uv, const TextureFootprint& footprint) {
     if (material == 0) return kWhite;
     const Material& m = materials_[material - 1];
     if (!m.image.exists()) return m.factor;

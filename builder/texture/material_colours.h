@@ -21,8 +21,8 @@ public:
         : materials_(std::move(materials)), textures_(textureBytes) {}
 
     [[nodiscard]] bool hasImages() const;
-    /// The colour of `material` (numbered from 1; 0: white) at `uv`, averaged over a square of edge `footprint`.
-    Rgba8 at(uint32_t material, glm::vec2 uv, float footprint);
+    /// The colour of `material` (numbered from 1; 0: white) at `uv`, averaged over `footprint`.
+    Rgba8 at(uint32_t material, glm::vec2 uv, const TextureFootprint& footprint);
     /// Images that could not be read, one line each.
     [[nodiscard]] std::span<const std::string> warnings() const { return textures_.warnings(); }
 

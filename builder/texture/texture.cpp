@@ -65,9 +65,30 @@ Image halved(const Image& fine) {
     return coarse;
 }
 
+// A footprint in texels of the finest level.
+struct Ellipse {
+    double length, width;
+    glm::dvec2 along;  // its length as a step of texture coordinates
+};
+
+Ellipse ellipseOf(const TextureFootprint& footprint, const Image& finest) {
+    const double w = finest.width, h = finest.height;
+    const double xx = footprint.uu * w * w, xy = footprint.uv * w * h, yy = footprint.vv * h * h;
+    const double mean = (xx + yy) / 2, apart = std::hypot((xx - yy) / 2, xy);
+    const double length = std::sqrt(mean + apart), width = std::sqrt(std::max(mean - apart, 0.0));
+    // Of the two ways to write the direction, the one that does not cancel.
+    glm::dvec2 direction = xx > yy ? glm::dvec2((xx - yy) / 2 + apart, xy) : glm::dvec2(xy, (yy - xx) / 2 + apart);
+    const double size = std::hypot(direction.x, direction.y);
+    direction = size > 0 ? direction / size : glm::dvec2(0);
+    return {length, width, {direction.x * length / w, direction.y * length / h}};
+}
+
+constexpr int kMostPlaces = 16;  // along a footprint; longer ones are taken as wider
+
 // Returns a texel's number inside 0..size-1. Any finite number of a float fits into int64_t after the clamp.
 uint32_t wrapped(double texel, uint32_t size, Wrap wrap) {
     const double edge = size;
+    if (texel >= 0 && texel < edge) return uint32_t(texel);
     if (wrap == Wrap::Clamp) return uint32_t(std::clamp(texel, 0.0, edge - 1));
     const double period = wrap == Wrap::Mirror ? 2 * edge : edge;
     double inside = texel - std::floor(texel / period) * period;
@@ -94,18 +115,16 @@ std::array<double, 4> Texture::bilinear(const Image& level, glm::dvec2 uv) const
     const double x = uv.x * level.width - 0.5, y = uv.y * level.height - 0.5;
     const double left = std::floor(x), top = std::floor(y);
     const double fx = x - left, fy = y - top;
+    const uint32_t columns[2] = {wrapped(left, level.width, wrapU_), wrapped(left + 1, level.width, wrapU_)};
     Light sum{};
-    for (int j = 0; j < 2; ++j)
-        for (int i = 0; i < 2; ++i) {
-            const uint32_t column = wrapped(left + i, level.width, wrapU_),
-                           row = wrapped(top + j, level.height, wrapV_);
-            add(sum, level.texels[size_t{row} * level.width + column], (i ? fx : 1 - fx) * (j ? fy : 1 - fy));
-        }
+    for (int j = 0; j < 2; ++j) {
+        const Rgba8* row = &level.texels[size_t{wrapped(top + j, level.height, wrapV_)} * level.width];
+        for (int i = 0; i < 2; ++i) add(sum, row[columns[i]], (i ? fx : 1 - fx) * (j ? fy : 1 - fy));
+    }
     return sum;
 }
 
-Rgba8 Texture::sample(glm::vec2 uv, float footprint) const {
-    const double texels = double(footprint) * std::max(levels_[0].width, levels_[0].height);
+Light Texture::trilinear(glm::dvec2 uv, double texels) const {
     const double coarsest = double(levels_.size() - 1);
     const double level = texels > 1 ? std::min(std::log2(texels), coarsest) : 0;
     const auto finer = size_t(level);
@@ -113,6 +132,36 @@ Rgba8 Texture::sample(glm::vec2 uv, float footprint) const {
     Light sum{};
     add(sum, bilinear(levels_[finer], uv), 1 - share);
     if (share > 0) add(sum, bilinear(levels_[finer + 1], uv), share);
+    return sum;
+}
+
+TextureFootprint TextureFootprint::ofCorner(const glm::vec2 (&uv)[3]) {
+    TextureFootprint sum;
+    for (int i = 0; i < 3; ++i) {
+        const glm::dvec2 edge = glm::dvec2(uv[(i + 1) % 3]) - glm::dvec2(uv[i]);
+        sum.uu += edge.x * edge.x;
+        sum.uv += edge.x * edge.y;
+        sum.vv += edge.y * edge.y;
+    }
+    // The squares of an equilateral triangle's edges sum up to 3/2 in each direction.
+    const double scale = kCornerWidth * kCornerWidth / 1.5;
+    return {scale * sum.uu, scale * sum.uv, scale * sum.vv};
+}
+
+glm::vec2 placeOfCorner(const glm::vec2 (&uv)[3], int i) {
+    return uv[i] + ((uv[(i + 1) % 3] - uv[i]) + (uv[(i + 2) % 3] - uv[i])) / 6.0f;
+}
+
+Rgba8 Texture::sample(glm::vec2 uv, const TextureFootprint& footprint) const {
+    const Ellipse ellipse = ellipseOf(footprint, levels_[0]);
+    const double ratio = std::round(ellipse.length / std::max(ellipse.width, 1.0));
+    const int places = ratio > 1 ? int(std::min(ratio, double(kMostPlaces))) : 1;
+    Light sum{};
+    for (int i = 0; i < places; ++i)
+        add(sum,
+            trilinear(glm::dvec2(uv) + ellipse.along * ((i + 0.5) / places - 0.5),
+                      std::max(ellipse.width, ellipse.length / places)),
+            1.0 / places);
     return encoded(sum);
 }
 

@@ -1,7 +1,8 @@
 // Texture: an image with a mip chain, sampled with filters; and the textures of a mesh's materials, in bounded memory.
 //
 // Texels are averaged as linear colours, each level from the one above by areas (any size, not only powers of two),
-// weighted by alpha, so that transparent texels lend no colour. Sampling is trilinear (Williams 1983).
+// weighted by alpha, so that transparent texels lend no colour. Sampling is trilinear (Williams 1983); where a
+// footprint is longer than wide, at several places along it (McCormack et al. 1999, "Feline").
 #pragma once
 
 #include <array>
@@ -20,20 +21,40 @@
 
 namespace vcp {
 
+/// Over how much of a texture a sample is averaged: an ellipse about it, by the squares of its axes, as a symmetric
+/// matrix in texture coordinates. All 0: the finest texels.
+struct TextureFootprint {
+    double uu = 0, uv = 0, vv = 0;
+
+    /// As wide in all directions.
+    static TextureFootprint round(double width) { return {width * width, 0, width * width}; }
+    /// Of the sample that says a corner's colour in one triangle; of an equilateral one as wide as kCornerWidth edges.
+    /// The order of the corners does not matter.
+    static TextureFootprint ofCorner(const glm::vec2 (&uv)[3]);
+};
+
+/// Where corners alone have colours, each stands for what is nearer to it than to others. A triangle samples its corner
+/// `i` in the middle of its own half next to it, so that nothing beyond its edges is taken: an atlas has other things
+/// there. The mean over the triangles about a corner is then centred there, and about an edge wide.
+glm::vec2 placeOfCorner(const glm::vec2 (&uv)[3], int i);
+inline constexpr double kCornerWidth = 0.3;
+
 class Texture {
 public:
     /// Makes a texture of one white texel.
     Texture();
     explicit Texture(Image image, Wrap wrapU = Wrap::Repeat, Wrap wrapV = Wrap::Repeat);
 
-    /// Returns the colour at `uv` ((0, 0): upper left corner, v downwards; finite), averaged over a square of the edge
-    /// `footprint` in the same units; 0: the finest texels. Any thread.
-    [[nodiscard]] Rgba8 sample(glm::vec2 uv, float footprint) const;
+    /// Returns the colour at `uv` ((0, 0): upper left corner, v downwards; finite), averaged over a footprint in the
+    /// same units. Any thread.
+    [[nodiscard]] Rgba8 sample(glm::vec2 uv, const TextureFootprint& footprint) const;
 
     [[nodiscard]] glm::uvec2 size() const { return {levels_[0].width, levels_[0].height}; }
     [[nodiscard]] uint64_t bytes() const;
 
 private:
+    /// Light and alpha, each texel weighted by its alpha.
+    [[nodiscard]] std::array<double, 4> trilinear(glm::dvec2 uv, double texels) const;
     [[nodiscard]] std::array<double, 4> bilinear(const Image& level, glm::dvec2 uv) const;
 
     std::vector<Image> levels_;  // the finest comes first

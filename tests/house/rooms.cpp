@@ -21,7 +21,7 @@ const std::vector<Room>& rooms() {
         {"builder/page", {"octree/", "builder/lattice"}},
         {"builder/slab", {"octree/", "builder/lattice", "builder/page"}},
         {"builder/level", {"octree/", "builder/lattice", "builder/spill"}},
-        {"builder/measure", {"octree/", "builder/stream", "builder/mesh"}},
+        {"builder/measure", {"octree/", "builder/stream", "builder/texture", "builder/mesh"}},
         {"builder",
          {"octree/", "builder/stream", "builder/texture", "builder/mesh", "builder/spill", "builder/lattice",
           "builder/page", "builder/slab", "builder/level"}},

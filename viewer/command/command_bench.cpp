@@ -7,39 +7,19 @@
 
 #include "viewer/bench/bench_build.h"
 #include "viewer/bench/bench_meso.h"
-#include "viewer/bench/picture/bench_picture.h"
 #include "viewer/bench/rays/bench_methods.h"
 #include "viewer/bench/rays/bench_rays.h"
 #include "viewer/bench/stress/bench_stream.h"
 #include "viewer/bench/stress/stress_path.h"
-#include "viewer/command/commands.h"
+#include "viewer/command/bench_command.h"
 #include "viewer/command/paper_arguments.h"
 #include "viewer/command/parsed_option.h"
 #include "viewer/command/source_arguments.h"
-#include "viewer/command/terminal/interrupt.h"
 #include "viewer/scene/option_values.h"
 
 namespace vcp {
 
 namespace {
-
-/// A report in its forms; plots are by file name without extension.
-struct BenchTexts {
-    std::string json, csv, markdown;
-    std::vector<std::pair<std::string, std::string>> plots = {};
-};
-
-struct BenchCommand {
-    std::vector<std::string> models;
-    std::string out;
-    int repetitions = 0;  // 0: the bench's own default
-    unsigned threads = 0;
-    double cell = 0;  // 0: chosen from the mesh
-    bool overwrite = false;
-    ReportOptions report;
-
-    [[nodiscard]] std::vector<std::filesystem::path> modelPaths() const { return {models.begin(), models.end()}; }
-};
 
 struct BuildBenchCommand : BenchCommand {
     std::vector<uint64_t> generated;
@@ -57,11 +37,6 @@ struct RaysCommand : BenchCommand {
     int judgeEvery = 1;
     bool sweep = false, stability = false;
     PaperOptions paper;
-};
-
-struct PictureCommand : BenchCommand {
-    BenchPictureOptions options;
-    glm::ivec2 size{960, 600};
 };
 
 struct StreamCommand {
@@ -83,55 +58,6 @@ struct MesoCommand {
     std::string device;  ///< empty: the CPU
     BenchCommand bench;
 };
-
-Result<void> makeFolder(const std::string& folder) {
-    std::error_code failed;
-    if (!folder.empty()) std::filesystem::create_directories(folder, failed);
-    if (failed)
-        return Error{
-            .code = ErrorCode::Io, .message = "the folder cannot be made: " + failed.message(), .file = folder};
-    return {};
-}
-
-/// Writes files into --out, and JSON or the table on stdout.
-Result<int> publish(const BenchCommand& command, const std::string& name, const BenchTexts& texts) {
-    if (!command.out.empty()) {
-        const std::filesystem::path folder = command.out;
-        const OutputRules rules{.overwrite = command.overwrite, .inputs = command.modelPaths()};
-        VCP_TRY(writeFile(folder / (name + ".json"), OutputKind::JsonText, texts.json, rules));
-        VCP_TRY(writeFile(folder / (name + ".csv"), OutputKind::Text, texts.csv, rules));
-        VCP_TRY(writeFile(folder / (name + ".md"), OutputKind::Text, texts.markdown, rules));
-        for (const auto& [plot, svg] : texts.plots)
-            VCP_TRY(writeFile(folder / (plot + ".svg"), OutputKind::Svg, svg, rules));
-    }
-    VCP_TRY(command.report.json ? printJsonText(texts.json) : printLine(texts.markdown));
-    return 0;
-}
-
-/// Hands on what all benches with models are asked.
-template <class Options>
-void takeShared(const BenchCommand& command, Options& options) {
-    options.models = command.modelPaths();
-    if (command.repetitions > 0) options.repetitions = command.repetitions;
-    options.threads = command.threads;
-    options.out = command.out;
-    options.cell = command.cell;
-}
-
-/// Runs bench(options) with its progress on stderr until Ctrl-C. `progress`: where `options` has the function that is
-/// told it.
-template <class Bench, class Options, class Progress>
-auto runShown(const BenchCommand& command, Bench bench, Options& options, Progress& progress) {
-    const InterruptScope catching;
-    ProgressDisplay display(command.report.progressStyle(), stderr);
-    progress = [&display](const std::string& what, double fraction) {
-        display.update(what, fraction);
-        return !interrupted();
-    };
-    auto report = bench(options);
-    display.finish();
-    return report;
-}
 
 /// Returns the path of make_scan, which lies beside vcp.
 Result<std::filesystem::path> findMakeScan() {
@@ -188,17 +114,6 @@ Result<int> runRays(const RaysCommand& command) {
                    {benchRaysJson(report), benchRaysCsv(report), benchRaysMarkdown(report), benchRaysPlots(report)});
 }
 
-Result<int> runPicture(const PictureCommand& command) {
-    VCP_TRY(makeFolder(command.out));
-    BenchPictureOptions options = command.options;
-    takeShared(command, options);
-    options.size = command.size;
-    VCP_TRY_ASSIGN(const auto report, runShown(command, benchPicture, options, options.progress));
-    return publish(
-        command, "bench_picture",
-        {benchPictureJson(report), benchPictureCsv(report), benchPictureMarkdown(report), benchPicturePlots(report)});
-}
-
 Result<int> runStream(const StreamCommand& command) {
     VCP_TRY(makeFolder(command.bench.out));
     BenchStreamOptions options;
@@ -225,23 +140,6 @@ Result<int> runMeso(const MesoCommand& command) {
     VCP_TRY_ASSIGN(const auto report, runShown(command.bench, benchMeso, options, options.progress));
     return publish(command.bench, "bench_meso",
                    {benchMesoJson(report), benchMesoCsv(report), benchMesoMarkdown(report), benchMesoPlots(report)});
-}
-
-void addBenchOptions(CLI::App& app, BenchCommand& command, const std::string& models) {
-    app.add_option("MODEL", command.models, models)->type_name("");
-    app.add_option("--out", command.out,
-                   "Folder for the report as JSON, CSV, Markdown and plots, and for what is built")
-        ->type_name("DIR");
-    addOverwriteOption(app, command.overwrite);
-    app.add_option("--repetitions", command.repetitions, "Runs whose median is reported")
-        ->type_name("N")
-        ->check(CLI::Range(1, 1000));
-    addCell(app, command.cell);
-    app.add_option("--threads", command.threads, "Threads [one a processor]")
-        ->type_name("N")
-        ->check(CLI::Range(1, 1024));
-    addProgressOption(app, command.report);
-    addJsonOption(app, command.report);
 }
 
 std::optional<uint64_t> parseScanSize(const std::string& text) {
@@ -311,44 +209,6 @@ RunCommand addBenchRays(CLI::App& bench) {
     addPaperMarchOptions(*app, command->paper.march);
     addPaperStructureOptions(*app, command->paper);
     return [command] { return runRays(*command); };
-}
-
-RunCommand addBenchPicture(CLI::App& bench) {
-    auto command = std::make_shared<PictureCommand>();
-    BenchPictureOptions& options = command->options;
-    CLI::App* app = bench.add_subcommand("picture", "Compare pictures with many samples a pixel of the mesh itself");
-    addBenchOptions(
-        *app, *command,
-        "Meshes, or .vcp files beside the meshes they were built from [a sphere, a torus and a thin plate]");
-    const auto list = [&](const char* name, std::vector<std::string>& values, const std::string& text) {
-        app->add_option(name, values, text)->type_name("A,B")->delimiter(',')->allow_extra_args(false);
-    };
-    list("--methods", options.methods, fmt::format("{} [all]", fmt::join(pictureMethodNames(), ", ")));
-    list("--cameras", options.cameras,
-         fmt::format("{} [all]; dive goes from whole to a cell of {:g} pixels", fmt::join(pictureCameraNames(), ", "),
-                     kDiveCellPixels));
-    app->add_option("--error-pixels", options.errorPixels, "Errors that a picture may have, in pixels: 0.25,0.5,1")
-        ->type_name("X,X")
-        ->delimiter(',')
-        ->allow_extra_args(false)
-        ->capture_default_str()
-        ->check(CLI::Range(0.01, 1000.0));
-    addSize(*app, command->size, "960x600", "Width and height in pixels")->default_str(sizeText(command->size));
-    const auto count = [&](const char* name, int& value, const char* text, int most) {
-        app->add_option(name, value, text)->type_name("N")->capture_default_str()->check(CLI::Range(1, most));
-    };
-    count("--dive-steps", options.diveSteps, "Frames of the dive", 1000);
-    count("--views", options.views, "Directions that each camera looks from", 1000);
-    count("--samples", options.samples, "The mesh's picture has N x N rays a pixel", 64);
-    app->add_option("--picture-samples", options.pictureSamples, "Rays a pixel of certified, as vcp render --samples")
-        ->type_name("N")
-        ->capture_default_str()
-        ->check(CLI::Range(1, int(kMostSamples)));
-    app->add_flag("--pictures", options.pictures, "Also write the pictures into --out, with isolated pixels in red");
-    app->add_option("--device", options.device,
-                    "Vulkan device of the method certified, see `vcp devices` [the best one]")
-        ->type_name("DEVICE");
-    return [command] { return runPicture(*command); };
 }
 
 RunCommand addBenchStream(CLI::App& bench) {
@@ -446,8 +306,8 @@ RunCommand addBenchMeso(CLI::App& bench) {
 Command addBench(CLI::App& vcp) {
     CLI::App* app = vcp.add_subcommand("bench", "Measure run time against error, beside a peer");
     app->require_subcommand(1);
-    const std::vector<RunCommand> runs{addBenchBuild(*app), addBenchRays(*app), addBenchPicture(*app),
-                                       addBenchStream(*app), addBenchMeso(*app)};
+    const std::vector<RunCommand> runs{addBenchBuild(*app),  addBenchRays(*app),   addBenchPicture(*app),
+                                       addBenchColour(*app), addBenchStream(*app), addBenchMeso(*app)};
     return {app, [=] {
                 const auto all = app->get_subcommands([](CLI::App*) { return true; });
                 const auto at = std::ranges::find_if(all, [](const CLI::App* each) { return each->parsed(); });

@@ -207,7 +207,7 @@ TEST(Texture, SamplesTexelCentresExactly) {
     for (uint32_t y = 0; y < 3; ++y)
         for (uint32_t x = 0; x < 5; ++x) {
             const glm::vec2 centre((float(x) + 0.5f) / 5, (float(y) + 0.5f) / 3);
-            const Rgba8 got = texture.sample(centre, 0), expected = image.texels[y * 5 + x];
+            const Rgba8 got = texture.sample(centre, {}), expected = image.texels[y * 5 + x];
             for (int shift = 0; shift < 32; shift += 8)
                 EXPECT_NEAR(got >> shift & 0xFF, expected >> shift & 0xFF, 1) << x << ' ' << y;
         }
@@ -215,13 +215,13 @@ TEST(Texture, SamplesTexelCentresExactly) {
 
 TEST(Texture, BlendsLightNotBytes) {
     const Texture texture(Image{2, 1, {rgba(0, 0, 0), rgba(255, 255, 255)}}, Wrap::Clamp, Wrap::Clamp);
-    EXPECT_EQ(texture.sample({0.5f, 0.5f}, 0) & 0xFF, 188u);  // half the light
-    EXPECT_EQ(texture.sample({0.5f, 0.5f}, 10) & 0xFF, 188u) << "the coarsest level";
+    EXPECT_EQ(texture.sample({0.5f, 0.5f}, {}) & 0xFF, 188u);  // half the light
+    EXPECT_EQ(texture.sample({0.5f, 0.5f}, TextureFootprint::round(10)) & 0xFF, 188u) << "the coarsest level";
 }
 
 TEST(Texture, WrapModes) {
     const Image image{2, 1, {rgba(255, 0, 0), rgba(0, 0, 255)}};
-    const auto at = [&](float u, Wrap wrap) { return Texture(image, wrap, wrap).sample({u, 0.5f}, 0); };
+    const auto at = [&](float u, Wrap wrap) { return Texture(image, wrap, wrap).sample({u, 0.5f}, {}); };
     for (const float period : {-2.0f, 0.0f, 6.0f}) {
         EXPECT_EQ(at(0.25f + period, Wrap::Repeat), rgba(255, 0, 0));
         EXPECT_EQ(at(0.25f + period, Wrap::Mirror), rgba(255, 0, 0));
@@ -239,14 +239,76 @@ TEST(Texture, EveryLevelKeepsTheMeanLight) {
         double mean = 0;
         for (const Rgba8 texel : image.texels)
             mean += srgbToLinear((texel & 0xFF) / 255.0) / double(image.texels.size());
-        const Rgba8 coarsest = Texture(image).sample({0.5f, 0.5f}, 1e9f);
+        const Rgba8 coarsest = Texture(image).sample({0.5f, 0.5f}, TextureFootprint::round(1e9));
         EXPECT_NEAR(coarsest & 0xFF, linearToSrgb(mean) * 255, 2) << width << " by " << height;
     }
 }
 
+TEST(Texture, LongFootprintsAreAveragedAlongAndNotAcross) {
+    // Columns of 8 texels, black and white in turn.
+    Image image{64, 64, {}};
+    for (uint32_t y = 0; y < 64; ++y)
+        for (uint32_t x = 0; x < 64; ++x) image.texels.push_back(x / 8 % 2 == 0 ? rgba(0, 0, 0) : kWhite);
+    const Texture texture(std::move(image));
+    const double length = 32.0 / 64, width = 1.0 / 64;
+    const glm::vec2 inWhite(12.0f / 64, 0.5f);
+    EXPECT_EQ(texture.sample(inWhite, {width * width, 0, length * length}), kWhite) << "along the columns";
+    const double across = lightOfByte()[texture.sample(inWhite, {length * length, 0, width * width}) & 0xFF];
+    EXPECT_NEAR(across, 0.5, 0.05) << "across them";
+    const double wide = lightOfByte()[texture.sample(inWhite, TextureFootprint::round(length)) & 0xFF];
+    EXPECT_NEAR(wide, 0.5, 0.1);
+    // Aslant, whichever way it leans, 32 texels reach over 22.6 columns, 8 of them white.
+    for (const double lean : {-1.0, 1.0}) {
+        const double half = length * length / 2;
+        EXPECT_NEAR(lightOfByte()[texture.sample(inWhite, {half, lean * half, half}) & 0xFF], 8 / 22.6, 0.05) << lean;
+    }
+}
+
+TEST(Texture, FootprintsOfPicturesThatAreNotSquareAreInTheirOwnTexels) {
+    // 4 texels wide and 64 high, one row in turn black: an eighth of the height is 8 rows, and half a column.
+    Image image{4, 64, {}};
+    for (uint32_t y = 0; y < 64; ++y)
+        for (uint32_t x = 0; x < 4; ++x) image.texels.push_back(y % 2 == 0 ? rgba(0, 0, 0) : kWhite);
+    for (uint32_t y = 0; y < 64; ++y) image.texels[4 * y] = rgba(255, 0, 0);
+    const Texture texture(std::move(image), Wrap::Clamp, Wrap::Clamp);
+    const Rgba8 seen = texture.sample({2.5f / 4, 0.5f}, TextureFootprint::round(0.125));
+    EXPECT_NEAR(lightOfByte()[seen & 0xFF], 0.5, 0.05);
+    EXPECT_EQ(seen & 0xFF, seen >> 8 & 0xFF) << "the red column is two columns away";
+}
+
+TEST(Texture, ACornersFootprintIsThatOfItsTriangle) {
+    const float height = std::sqrt(0.75f);
+    const glm::vec2 even[3] = {{0, 0}, {1, 0}, {0.5f, height}};
+    const TextureFootprint round = TextureFootprint::ofCorner(even);
+    EXPECT_NEAR(round.uu, kCornerWidth * kCornerWidth, 1e-6);
+    EXPECT_NEAR(round.vv, kCornerWidth * kCornerWidth, 1e-6);
+    EXPECT_NEAR(round.uv, 0, 1e-6);
+    const glm::vec2 turned[3] = {even[2], even[0], even[1]}, mirrored[3] = {even[1], even[0], even[2]};
+    for (const auto& other : {TextureFootprint::ofCorner(turned), TextureFootprint::ofCorner(mirrored)}) {
+        EXPECT_NEAR(other.uu, round.uu, 1e-12);
+        EXPECT_NEAR(other.vv, round.vv, 1e-12);
+        EXPECT_NEAR(other.uv, round.uv, 1e-12);
+    }
+    glm::vec2 sum(0);
+    for (int i = 0; i < 3; ++i) sum += placeOfCorner(even, i);
+    EXPECT_NEAR(sum.x / 3, 0.5, 1e-6);
+    EXPECT_NEAR(sum.y / 3, height / 3, 1e-6);
+    EXPECT_NEAR(placeOfCorner(even, 2).y, height * 2 / 3, 1e-6) << "two thirds of the way from the middle of an edge";
+    const glm::vec2 nowhere[3] = {{3, 4}, {3, 4}, {3, 4}};
+    EXPECT_EQ(TextureFootprint::ofCorner(nowhere).uu, 0);
+}
+
+TEST(Texture, HugeFootprintsAndPlacesAreTheMean) {
+    Image image{8, 8, {}};
+    for (uint32_t i = 0; i < 64; ++i) image.texels.push_back(i % 2 == 0 ? rgba(0, 0, 0) : kWhite);
+    const Texture texture(std::move(image));
+    for (const double width : {1e3, 1e30, 1e150})
+        EXPECT_NEAR(lightOfByte()[texture.sample({1e20f, -3e7f}, TextureFootprint::round(width)) & 0xFF], 0.5, 0.02);
+}
+
 TEST(Texture, WhatIsTransparentLendsNoColour) {
     const Texture texture(Image{2, 1, {rgba(255, 0, 0, 255), rgba(0, 255, 0, 0)}}, Wrap::Clamp, Wrap::Clamp);
-    EXPECT_EQ(texture.sample({0.5f, 0.5f}, 0), rgba(255, 0, 0, 128));
+    EXPECT_EQ(texture.sample({0.5f, 0.5f}, {}), rgba(255, 0, 0, 128));
 }
 
 TEST(TextureCache, LoadsOnDemandAndForgetsTheLeastRecentlyUsed) {
@@ -262,7 +324,7 @@ TEST(TextureCache, LoadsOnDemandAndForgetsTheLeastRecentlyUsed) {
     for (const uint32_t number : {0, 1, 0, 2, 1, 0}) {
         const Texture* const texture = cache.textureOf(materials, number);
         ASSERT_NE(texture, nullptr);
-        EXPECT_EQ(texture->sample({0.5f, 0.5f}, 0) & 0xFF, number);
+        EXPECT_EQ(texture->sample({0.5f, 0.5f}, {}) & 0xFF, number);
         EXPECT_LE(cache.bytes(), 3000u);
     }
     EXPECT_EQ(cache.textureOf(materials, 3), nullptr);

@@ -1,18 +1,16 @@
 #include "viewer/bench/picture/bench_picture.h"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
-#include <ctime>
 
 #include <fmt/format.h>
 #include <glm/geometric.hpp>
 
 #include "render/picture.h"
-#include "render/view/renderer.h"
 #include "viewer/bench/picture/flip.h"
 #include "viewer/bench/picture/mesh_picture.h"
 #include "viewer/bench/picture/picture_difference.h"
+#include "viewer/bench/picture/settled_drawing.h"
 #include "viewer/bench/rays/analytic_models.h"
 #include "viewer/bench/rays/bench_cameras.h"
 #include "viewer/bench/rays/bench_model.h"
@@ -22,40 +20,10 @@ namespace vcp {
 
 namespace {
 
-/// A file whose bytes are counted as they are read.
-class CountingReader final : public ByteReader {
-public:
-    explicit CountingReader(std::shared_ptr<ByteReader> file) : file_(std::move(file)) {}
-    Result<void> read(uint64_t offset, std::span<std::byte> bytes) const override {
-        bytes_ += bytes.size();
-        return file_->read(offset, bytes);
-    }
-    [[nodiscard]] uint64_t size() const override { return file_->size(); }
-    [[nodiscard]] const std::string& name() const override { return file_->name(); }
-    [[nodiscard]] uint64_t bytes() const { return bytes_; }
-
-private:
-    std::shared_ptr<ByteReader> file_;
-    mutable std::atomic<uint64_t> bytes_{0};
-};
-
-double processorSeconds() {
-    std::timespec now{};
-    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
-    return double(now.tv_sec) + 1e-9 * double(now.tv_nsec);
-}
-
 /// One frame of a camera's way, and its name in the report.
 struct NamedCamera {
     std::string name;
     Camera camera;
-};
-
-/// What drawing a picture took.
-struct PictureCost {
-    double cpuMs = 0;
-    uint64_t bytesRead = 0, residentBytes = 0;
-    uint32_t coarsestLevel = 0, finestLevel = 0;
 };
 
 struct DrawnPicture {
@@ -75,69 +43,28 @@ public:
     virtual Result<DrawnPicture> draw(const FrameRequest& request) = 0;
 };
 
-/// Draws `repetitions` times after a warm-up. Returns the median of the processor times.
-template <class Draw>
-Result<double> medianCpuMs(int repetitions, const Draw& draw) {
-    std::vector<double> seconds;
-    for (int repetition = 0; repetition <= repetitions; ++repetition) {
-        const double start = processorSeconds();
-        VCP_TRY(draw());
-        if (repetition > 0) seconds.push_back(processorSeconds() - start);
-    }
-    return 1e3 * upperQuantile(seconds, 0.5);
-}
-
 class RendererMethod final : public PictureMethod {
 public:
-    static Result<std::unique_ptr<PictureMethod>> create(const std::filesystem::path& file, const std::string& device,
-                                                         double errorPixels, int repetitions, uint32_t samples) {
-        RendererOptions options;
-        options.device = device;
-        options.budgetBytes = uint64_t{2} << 30;
-        VCP_TRY_ASSIGN(auto renderer, Renderer::create(options));
-        std::unique_ptr<RendererMethod> method(new RendererMethod(std::move(renderer), file, errorPixels));
-        method->repetitions_ = repetitions;
-        method->samples_ = samples;
-        return std::unique_ptr<PictureMethod>(std::move(method));
-    }
+    explicit RendererMethod(std::unique_ptr<SettledDrawing> drawing) : drawing_(std::move(drawing)) {}
 
     [[nodiscard]] std::string name() const override { return "certified"; }
-    [[nodiscard]] std::string knob() const override {
-        const std::string samples = samples_ > 1 ? fmt::format(", samples {}", samples_) : "";
-        return fmt::format("error-pixels {:g}{}", errorPixels_, samples);
-    }
-    [[nodiscard]] std::string device() const override { return renderer_->device().name; }
+    [[nodiscard]] std::string knob() const override { return drawing_->knob(); }
+    [[nodiscard]] std::string device() const override { return drawing_->device(); }
+    Result<void> startAnew() override { return drawing_->startAnew(); }
 
-    Result<void> startAnew() override {
-        VCP_TRY_ASSIGN(auto file, openFile(file_));
-        reader_ = std::make_shared<CountingReader>(file);
-        VCP_TRY_ASSIGN(auto dataset, readDataset(*reader_));
-        const auto shared = std::make_shared<const Dataset>(std::move(dataset));
-        return renderer_->open(shared, std::make_shared<FilePageSource>(reader_, shared));
-    }
-
-    Result<DrawnPicture> draw(const FrameRequest& light) override {
-        FrameRequest request = light;
-        request.errorPixels = errorPixels_;
-        VCP_TRY_ASSIGN(const auto settled, renderer_->settle(request));
+    Result<DrawnPicture> draw(const FrameRequest& request) override {
         DrawnPicture drawn;
-        drawn.cost = {0, reader_->bytes(), settled.residentBytes, settled.coarsestLevel, settled.finestLevel};
-        VCP_TRY_ASSIGN(drawn.cost.cpuMs, medianCpuMs(repetitions_, [&]() -> Result<void> {
-                           VCP_TRY(renderer_->render(request));
-                           return renderer_->refineTo(samples_, request);
-                       }));
+        VCP_TRY_ASSIGN(drawn.cost, drawing_->draw(request));
         VCP_TRY(read(drawn.picture));
         return drawn;
     }
 
 private:
-    RendererMethod(std::unique_ptr<Renderer> renderer, std::filesystem::path file, double errorPixels)
-        : renderer_(std::move(renderer)), file_(std::move(file)), errorPixels_(errorPixels) {}
-
     Result<void> read(LightPicture& light) {
-        VCP_TRY_ASSIGN(const auto picture, renderer_->readPicture());
-        VCP_TRY_ASSIGN(auto depth, renderer_->readDepth());
-        VCP_TRY_ASSIGN(auto normals, renderer_->readNormals());
+        Renderer& renderer = drawing_->renderer();
+        VCP_TRY_ASSIGN(const auto picture, renderer.readPicture());
+        VCP_TRY_ASSIGN(auto depth, renderer.readDepth());
+        VCP_TRY_ASSIGN(auto normals, renderer.readNormals());
         light.size = {picture.width, picture.height};
         light.depth = std::move(depth);
         light.normals = std::move(normals);
@@ -150,12 +77,7 @@ private:
         return {};
     }
 
-    std::unique_ptr<Renderer> renderer_;
-    std::filesystem::path file_;
-    double errorPixels_;
-    int repetitions_ = 1;
-    uint32_t samples_ = 1;
-    std::shared_ptr<CountingReader> reader_;
+    std::unique_ptr<SettledDrawing> drawing_;
 };
 
 class EmbreeMethod final : public PictureMethod {
@@ -251,9 +173,9 @@ private:
                 continue;
             }
             for (const double pixels : o_.errorPixels) {
-                VCP_TRY_ASSIGN(auto method, RendererMethod::create(m.files.vcp, o_.device, pixels, o_.repetitions,
-                                                                   o_.pictureSamples));
-                methods.push_back(std::move(method));
+                VCP_TRY_ASSIGN(auto drawing, SettledDrawing::create(
+                                                 m.files.vcp, {o_.device, pixels, o_.pictureSamples, o_.repetitions}));
+                methods.push_back(std::make_unique<RendererMethod>(std::move(drawing)));
             }
         }
         for (const std::string& camera : o_.cameras) VCP_TRY(runCamera(m, *mesh, methods, camera));

@@ -12,7 +12,7 @@
 #include "render/frame_setup.h"
 
 #ifdef VCP_HAVE_EMBREE
-#include "viewer/bench/rays/embree_scene.h"
+#include "viewer/bench/picture/row_rays.h"
 #endif
 
 namespace vcp {
@@ -95,7 +95,8 @@ public:
                              std::vector<glm::vec3>(count, glm::vec3(0)), std::vector<float>(count)};
         forEachRow(size.y, threads_, [&](int y) {
             std::vector<PixelSum> row(size.x);
-            sumRow(rays, lights, y, samples, row);
+            traceRow(scene_, rays, y, size.x, samples,
+                     [&](const RTCRayHit8& r, int k, int pixel) { addSample(r, k, lights, row[pixel]); });
             const auto all = float(samples * samples);
             for (int x = 0; x < size.x; ++x) {
                 const PixelSum& sum = row[x];
@@ -112,35 +113,6 @@ public:
     }
 
 private:
-    /// Traces the samples of a row of pixels, eight at a time, from left to right and then downwards.
-    void sumRow(const FloatCamera& rays, const LightDirections& lights, int y, int samples,
-                std::vector<PixelSum>& row) const {
-        const int across = int(row.size()) * samples;
-        for (int line = 0; line < samples; ++line)
-            for (int first = 0; first < across; first += 8) {
-                alignas(32) int valid[8];
-                alignas(32) RTCRayHit8 r;
-                for (int k = 0; k < 8; ++k) {
-                    valid[k] = first + k < across ? -1 : 0;
-                    const float px = (float(first + k) + 0.5f) / float(samples);
-                    const float py = float(y) + (float(line) + 0.5f) / float(samples);
-                    const glm::vec3 d = rays.direction(px, py);
-                    r.ray.org_x[k] = rays.eye.x, r.ray.org_y[k] = rays.eye.y, r.ray.org_z[k] = rays.eye.z;
-                    r.ray.dir_x[k] = d.x, r.ray.dir_y[k] = d.y, r.ray.dir_z[k] = d.z;
-                    r.ray.tnear[k] = 0, r.ray.time[k] = 0, r.ray.tfar[k] = INFINITY;
-                    r.ray.mask[k] = ~0u, r.ray.flags[k] = 0, r.ray.id[k] = 0;
-                    r.hit.geomID[k] = RTC_INVALID_GEOMETRY_ID, r.hit.instID[0][k] = RTC_INVALID_GEOMETRY_ID;
-                }
-                RTCIntersectContext context;
-                rtcInitIntersectContext(&context);
-                context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
-                rtcIntersect8(valid, scene_.scene(), &context, &r);
-                for (int k = 0; k < 8; ++k)
-                    if (valid[k] && r.hit.geomID[k] != RTC_INVALID_GEOMETRY_ID)
-                        addSample(r, k, lights, row[(first + k) / samples]);
-            }
-    }
-
     void addSample(const RTCRayHit8& r, int k, const LightDirections& lights, PixelSum& sum) const {
         const glm::vec3 d(r.ray.dir_x[k], r.ray.dir_y[k], r.ray.dir_z[k]);
         const glm::vec3 flat(r.hit.Ng_x[k], r.hit.Ng_y[k], r.hit.Ng_z[k]);

@@ -17,13 +17,13 @@ Result<ModelFiles> filesOf(const std::filesystem::path& model, const std::filesy
         const std::string name = model.stem().string();
         return ModelFiles{model, folder / (cell > 0 ? fmt::format("{}-cell-{}.vcp", name, cell) : name + ".vcp"), name};
     }
-    for (const char* extension : {".ply", ".obj", ".stl"}) {
+    for (const char* extension : {".ply", ".obj", ".stl", ".gltf", ".glb"}) {
         std::filesystem::path mesh = model;
         mesh.replace_extension(extension);
         if (std::filesystem::exists(mesh)) return ModelFiles{mesh, model, model.stem().string()};
     }
     return Error{.code = ErrorCode::Usage,
-                 .message = "no mesh of the same name lies beside it (.ply, .obj, .stl)",
+                 .message = "no mesh of the same name lies beside it (.ply, .obj, .stl, .gltf, .glb)",
                  .file = model.string()};
 }
 
@@ -40,12 +40,13 @@ Result<void> checkNames(const std::vector<std::string>& wanted, const std::vecto
 
 Result<std::unique_ptr<BenchModel>> loadBenchModel(const std::filesystem::path& path,
                                                    const std::filesystem::path& folder, double cell, unsigned threads,
-                                                   const std::function<Result<void>(const std::string& what)>& report) {
+                                                   const std::function<Result<void>(const std::string& what)>& report,
+                                                   const LoadOptions& load) {
     VCP_TRY_ASSIGN(auto files, filesOf(path, folder, cell));
     auto model = std::make_unique<BenchModel>();
     model->files = files;
     VCP_TRY(report(fmt::format("{}: reading the mesh", files.name)));
-    VCP_TRY_ASSIGN(auto mesh, loadMesh(files.mesh));
+    VCP_TRY_ASSIGN(auto mesh, loadMesh(files.mesh, load));
     model->mesh = std::move(mesh);
     if (!std::filesystem::exists(files.vcp)) {
         VCP_TRY(report(fmt::format("{}: building", files.name)));
