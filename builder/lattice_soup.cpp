@@ -99,11 +99,10 @@ int LatticeSnapper::cut(const Piece& piece, Piece (&pieces)[4]) const {
 
 void LatticeSnapper::paint(Piece& piece) const {
     // A corner that several triangles meet in gets the mean of what each says of it (meshOf).
-    const TextureFootprint footprint = TextureFootprint::ofCorner(piece.uv);
-    for (int i = 0; i < 3; ++i) {
-        const Rgba8 painted = colours_->at(piece.material, placeOfCorner(piece.uv, i), footprint);
-        piece.triangle.colour[i] = vertexColours_ ? modulate(piece.triangle.colour[i], painted) : painted;
-    }
+    const std::array<Rgba8, 3> painted = colours_->ofCorners(piece.material, piece.uv);
+    for (int i = 0; i < 3; ++i)
+        piece.triangle.colour[i] =
+            vertexColours_ ? modulate(piece.triangle.colour[i], painted[size_t(i)]) : painted[size_t(i)];
 }
 
 float LatticeSnapper::strayOf(const Piece& piece) const {

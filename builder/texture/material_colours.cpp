@@ -11,13 +11,18 @@ bool MaterialColours::hasImages() const {
                        [](const Material& material) { return material.image.exists(); });
 }
 
-Rgba8 MaterialColours::at(uint32_t material, glm::vec2 uv, const TextureFootprint& footprint) {
-    if (material == 0) return kWhite;
+std::array<Rgba8, 3> MaterialColours::ofCorners(uint32_t material, const glm::vec2 (&uv)[3]) {
+    if (material == 0) return {kWhite, kWhite, kWhite};
     const Material& m = materials_[material - 1];
-    if (!m.image.exists()) return m.factor;
+    std::array<Rgba8, 3> colours{m.factor, m.factor, m.factor};
+    if (!m.image.exists()) return colours;
+    const TextureFootprint footprint = TextureFootprint::ofCorner(uv);
     const std::scoped_lock lock(mutex_);
     const Texture* texture = textures_.textureOf(materials_, material - 1);
-    return texture ? modulate(m.factor, texture->sample(uv, footprint)) : m.factor;
+    if (!texture) return colours;
+    for (int i = 0; i < 3; ++i)
+        colours[size_t(i)] = modulate(m.factor, texture->sample(placeOfCorner(uv, i), footprint));
+    return colours;
 }
 
 }  // namespace vcp

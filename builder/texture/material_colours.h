@@ -1,6 +1,7 @@
 // The colours that materials give to vertices.
 #pragma once
 
+#include <array>
 #include <mutex>
 #include <span>
 #include <string>
@@ -21,8 +22,9 @@ public:
         : materials_(std::move(materials)), textures_(textureBytes) {}
 
     [[nodiscard]] bool hasImages() const;
-    /// The colour of `material` (numbered from 1; 0: white) at `uv`, averaged over `footprint`.
-    Rgba8 at(uint32_t material, glm::vec2 uv, const TextureFootprint& footprint);
+    /// Returns what `material` (numbered from 1; 0: white) gives the corners of a triangle with these texture
+    /// coordinates (placeOfCorner).
+    std::array<Rgba8, 3> ofCorners(uint32_t material, const glm::vec2 (&uv)[3]);
     /// Images that could not be read, one line each.
     [[nodiscard]] std::span<const std::string> warnings() const { return textures_.warnings(); }
 
