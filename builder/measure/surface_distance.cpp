@@ -9,6 +9,8 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
+#include "builder/measure/colour_difference.h"
+#include "builder/measure/hit_colour.h"
 #include "builder/measure/mesh_samples.h"
 
 namespace vcp {
@@ -168,11 +170,6 @@ double distanceToSurface(const ReferenceCaster& caster, const LevelLeaves& leave
     return best;
 }
 
-/// A hit of the surface; its normal is a unit, on either side.
-struct SurfacePoint {
-    glm::dvec3 position, normal;
-};
-
 /// Returns the angle between two units' lines, 0 to 90 degrees.
 double lineDegrees(glm::dvec3 a, glm::dvec3 b) {
     return std::acos(std::min(std::abs(glm::dot(a, b)), 1.0)) * 180 / std::numbers::pi;
@@ -187,8 +184,7 @@ glm::dvec3 triangleNormal(const IndexedMesh& mesh, uint32_t triangle) {
 }
 
 /// Finds the hits of one random ray through a leaf that lie in the leaf.
-void hitsOfLeaf(const ReferenceCaster& caster, const LeafBox& leaf, SampleRandom& random,
-                std::vector<SurfacePoint>& hits) {
+void hitsOfLeaf(const ReferenceCaster& caster, const LeafBox& leaf, SampleRandom& random, std::vector<RayHit>& hits) {
     const Dataset& dataset = caster.cache().dataset();
     const PageEntry& entry = dataset.pages[leaf.page];
     const double cell = dataset.cellOf(entry.level);
@@ -197,8 +193,27 @@ void hitsOfLeaf(const ReferenceCaster& caster, const LeafBox& leaf, SampleRandom
     const double reach = 2 * leaf.edge * cell;
     const glm::dvec3 middle = dataset.originOf(entry) + inLeaf * cell;
     for (const RayHit& hit : caster.castAll({middle - reach * direction, direction, 0, 2 * reach}))
-        if (hit.page == leaf.page && hit.leafMin == leaf.lowest && hit.leafEdge == leaf.edge)
-            hits.push_back({hit.position, hit.normal});
+        if (hit.page == leaf.page && hit.leafMin == leaf.lowest && hit.leafEdge == leaf.edge) hits.push_back(hit);
+}
+
+/// Returns how the colours of a hit and of the mesh's point nearest to it differ; nothing where one has none, or images
+/// cut the point out.
+std::optional<double> differenceAt(const PageCache& cache, const RayHit& hit, const MeshPaint& paint,
+                                   const IndexedMesh& mesh, const NearestPoint& nearest) {
+    const auto light = lightOfHit(cache, hit);
+    if (!light || !paint.hasColour()) return {};
+    const auto corners = mesh.corners(nearest.triangle);
+    const PaintedLight painted =
+        paint.lightAt(mesh, nearest.triangle, cornerWeights(nearest.point, corners[0], corners[1], corners[2]));
+    if (!(painted.cover > 0)) return {};
+    return colourDifference(*light, painted.light / painted.cover);
+}
+
+/// Joins what blocks of samples found, in their order.
+std::vector<float> joined(const std::vector<std::vector<float>>& blocks) {
+    std::vector<float> all;
+    for (const auto& block : blocks) all.insert(all.end(), block.begin(), block.end());
+    return all;
 }
 
 /// Keeps the largest distance that threads report; ties go to the lowest sample.
@@ -248,31 +263,35 @@ Result<SurfaceDistance> measureSurfaceDistance(const PageCache& cache, const Mes
         return cancelled;
 
     const std::vector<LeafBox> leaves = leavesOfLevel.list();
-    std::vector<std::vector<float>> toMesh((options.samples + kBlock - 1) / kBlock), degrees(toMesh.size());
+    std::vector<std::vector<float>> toMesh((options.samples + kBlock - 1) / kBlock), degrees(toMesh.size()),
+        colours(toMesh.size());
     Worst worstOfSurface;
     if (!leaves.empty() && !runner.run(options.samples, 0.6, 1, [&](uint64_t i) {
             SampleRandom random(options.seed, 2 * i + 1);
-            std::vector<SurfacePoint> hits;
+            std::vector<RayHit> hits;
             // Most lines through a leaf miss its surface.
             const LeafBox& leaf = leaves[random.below(leaves.size())];
             for (int ray = 0; ray < 8 && hits.empty(); ++ray) hitsOfLeaf(caster, leaf, random, hits);
-            for (const SurfacePoint& hit : hits) {
+            for (const RayHit& hit : hits) {
                 const auto nearest = *mesh.nearestPoint(hit.position);
                 toMesh[i / kBlock].push_back(float(nearest.distance));
                 worstOfSurface.add(nearest.distance, i, hit.position);
                 const glm::dvec3 normal = triangleNormal(mesh.mesh(), nearest.triangle);
                 if (normal != glm::dvec3(0)) degrees[i / kBlock].push_back(float(lineDegrees(hit.normal, normal)));
+                if (options.paint == nullptr) continue;
+                if (const auto difference = differenceAt(cache, hit, *options.paint, mesh.mesh(), nearest))
+                    colours[i / kBlock].push_back(float(*difference));
             }
         }))
         return cancelled;
 
-    std::vector<float> allToMesh, allDegrees;
-    for (const auto& block : toMesh) allToMesh.insert(allToMesh.end(), block.begin(), block.end());
-    for (const auto& block : degrees) allDegrees.insert(allDegrees.end(), block.begin(), block.end());
+    std::vector<float> allToMesh = joined(toMesh), allColours = joined(colours);
     result.samples = toSurface.size() + allToMesh.size();
     result.meshToSurface = quantilesOf(std::move(toSurface));
     result.surfaceToMesh = quantilesOf(std::move(allToMesh));
-    result.normalDegrees = quantilesOf(std::move(allDegrees));
+    result.normalDegrees = quantilesOf(joined(degrees));
+    result.colourSamples = allColours.size();
+    result.colourDifference = quantilesOf(std::move(allColours));
     result.worstOfMesh = worstOfMesh.position;
     result.worstOfSurface = worstOfSurface.position;
     return result;

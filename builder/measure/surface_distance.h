@@ -8,7 +8,9 @@
 //                     exact distance to the triangles of hard leaves, each cut off at its leaf's walls.
 //   surface to mesh   samples: hits of random rays through the leaves of the level, every leaf alike.
 //                     The distance to the mesh is exact (MeshBvh). Of the same hits, the angle between
-//                     the surface's normal and that of the nearest triangle's plane.
+//                     the surface's normal and that of the nearest triangle's plane; and, where both have
+//                     colour, how they differ at the two points (colour_difference.h): what is finer than the
+//                     surface keeps counts in full, as it would where a pixel shows but that point.
 // Both measurements are seeded: the numbers are the same whatever the number of threads.
 #pragma once
 
@@ -16,6 +18,7 @@
 #include <functional>
 
 #include "builder/measure/mesh_bvh.h"
+#include "builder/measure/mesh_paint.h"
 #include "builder/measure/ray_classes.h"
 #include "octree/reference_caster.h"
 
@@ -26,6 +29,7 @@ struct SurfaceDistanceOptions {
     uint64_t seed = 1;
     unsigned threads = 0;         ///< 0: one a processor
     uint32_t level = UINT32_MAX;  ///< the level whose surface is measured; the finest if there is none of that number
+    const MeshPaint* paint = nullptr;  ///< the mesh's colours; null: they are not measured
     /// Called from one thread at a time with the fraction done; false cancels. May be empty.
     std::function<bool(double)> progress;
 };
@@ -34,6 +38,8 @@ struct SurfaceDistance {
     Quantiles meshToSurface;       ///< world units
     Quantiles surfaceToMesh;       ///< world units
     Quantiles normalDegrees;       ///< between the surface's normals and the mesh's, 0 to 90
+    Quantiles colourDifference;    ///< of the surface and the mesh; zeros where either has no colour
+    uint64_t colourSamples = 0;    ///< hits whose colours were compared
     glm::dvec3 worstOfMesh{0};     ///< the sample with the largest distance to the surface
     glm::dvec3 worstOfSurface{0};  ///< the hit with the largest distance to the mesh
     uint64_t samples = 0;          ///< samples measured, both ways together

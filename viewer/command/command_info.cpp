@@ -18,7 +18,7 @@ struct InfoCommand {
 
 /// Sums over the pages of a level.
 struct LevelSums {
-    uint64_t storedBytes = 0, pageBytes = 0, leaves = 0, slabLeaves = 0, hardLeaves = 0;
+    uint64_t storedBytes = 0, colourStoredBytes = 0, pageBytes = 0, leaves = 0, slabLeaves = 0, hardLeaves = 0;
 };
 
 LevelSums sumsOf(const Dataset& dataset, uint32_t level) {
@@ -27,6 +27,7 @@ LevelSums sumsOf(const Dataset& dataset, uint32_t level) {
     for (uint64_t i = row.firstEntry; i < row.firstEntry + row.pages; ++i) {
         const PageEntry& page = dataset.pages[i];
         sums.storedBytes += uint64_t(page.storedBytes) + page.colourStoredBytes;
+        sums.colourStoredBytes += page.colourStoredBytes;
         sums.pageBytes += uint64_t(page.pageBytes) + page.colourBytes;
         sums.leaves += page.leaves;
         sums.slabLeaves += page.slabLeaves;
@@ -35,17 +36,33 @@ LevelSums sumsOf(const Dataset& dataset, uint32_t level) {
     return sums;
 }
 
+/// Bytes of all pages in the file.
+struct StoredBytes {
+    uint64_t geometry = 0, colour = 0;
+};
+
+StoredBytes storedBytesOf(const Dataset& dataset) {
+    StoredBytes bytes;
+    for (const PageEntry& page : dataset.pages) {
+        bytes.geometry += page.storedBytes;
+        bytes.colour += page.colourStoredBytes;
+    }
+    return bytes;
+}
+
 const char* methodName(Method method) { return method == Method::Paper ? "paper" : "certified"; }
 
 Json toJson(const std::string& file, const Dataset& dataset) {
     const FileHeader& h = dataset.header;
     Json levels = Json::array();
+    const StoredBytes bytes = storedBytesOf(dataset);
     for (uint32_t level = 0; level < h.levels; ++level) {
         const LevelSums sums = sumsOf(dataset, level);
         levels.push_back({{"level", level},
                           {"cell", dataset.cellOf(level)},
                           {"subvolumes", h.level[level].pages},
                           {"stored_bytes", sums.storedBytes},
+                          {"colour_stored_bytes", sums.colourStoredBytes},
                           {"page_bytes", sums.pageBytes},
                           {"leaves", sums.leaves},
                           {"slab_leaves", sums.slabLeaves},
@@ -63,6 +80,8 @@ Json toJson(const std::string& file, const Dataset& dataset) {
             {"closed_parts", dataset.hasParts() ? Json(h.closedParts) : Json()},
             {"open_edges", dataset.hasParts() ? Json(h.openEdges) : Json()},
             {"colour", dataset.hasColour()},
+            {"geometry_stored_bytes", bytes.geometry},
+            {"colour_stored_bytes", bytes.colour},
             {"bounds_min", Json::array({h.boundsMin[0], h.boundsMin[1], h.boundsMin[2]})},
             {"bounds_max", Json::array({h.boundsMax[0], h.boundsMax[1], h.boundsMax[2]})},
             {"origin", Json::array({h.origin[0], h.origin[1], h.origin[2]})},
@@ -92,12 +111,19 @@ std::string partsLine(const FileHeader& h) {
                        formatCount(h.parts - h.closedParts), formatCount(h.openEdges));
 }
 
+std::string bytesLine(const Dataset& dataset) {
+    const StoredBytes bytes = storedBytesOf(dataset);
+    return fmt::format("  stored      {} of geometry, {} of colour\n", formatBytes(bytes.geometry),
+                       formatBytes(bytes.colour));
+}
+
 std::string summary(const std::string& file, const Dataset& dataset) {
     const FileHeader& h = dataset.header;
     std::string text = fmt::format("{}: .vcp version {}, {}\n", file, h.version, formatBytes(h.fileBytes));
     text += fmt::format("  mesh        {} triangles ({} without area), {} vertices, {}\n", formatCount(h.triangles),
                         formatCount(h.degenerateTriangles), formatCount(h.vertices),
                         dataset.hasColour() ? "with colour" : "no colour");
+    text += bytesLine(dataset);
     if (dataset.hasParts()) text += partsLine(h);
     text += fmt::format("  bounds      {:.9g} {:.9g} {:.9g}  to  {:.9g} {:.9g} {:.9g}\n", h.boundsMin[0],
                         h.boundsMin[1], h.boundsMin[2], h.boundsMax[0], h.boundsMax[1], h.boundsMax[2]);

@@ -52,7 +52,10 @@ Result<SurfaceDistance> measure(const VerifyCommand& command) {
     ProgressDisplay display(command.report.progressStyle(), stderr);
     display.update("reading the mesh", 0);
     const std::vector<std::filesystem::path> meshes(command.against.begin(), command.against.end());
-    VCP_TRY_ASSIGN(const auto mesh, loadMesh(meshes));
+    MeshPaint paint;
+    LoadOptions load;
+    load.chunk = [&](size_t file, const MeshStream& stream, const MeshChunk& chunk) { paint.add(file, stream, chunk); };
+    VCP_TRY_ASSIGN(const auto mesh, loadMesh(meshes, load));
     display.update("sorting the mesh", 0.1);
     const MeshBvh bvh(mesh);
     display.update("reading the level", 0.2);
@@ -63,11 +66,14 @@ Result<SurfaceDistance> measure(const VerifyCommand& command) {
                      .message = fmt::format("has no level {}, only 0 to {}", command.level, levels - 1),
                      .file = command.file};
     VCP_TRY(cache.loadLevel(std::min(command.level, levels - 1)));
+    if (cache.dataset().hasColour()) paint.loadImages();
+    for (const std::string& warning : paint.warnings()) warnOnTerminal(warning);
 
     SurfaceDistanceOptions options;
     options.samples = command.samples;
     options.level = command.level;
     options.threads = command.threads;
+    options.paint = &paint;
     options.progress = [&](double fraction) {
         display.update("measuring", 0.3 + 0.7 * fraction);
         return !interrupted();
@@ -89,6 +95,7 @@ void addDistances(Json& json, const SurfaceDistance& distance) {
     json["mesh_to_surface_cells"] = toJson(inCells(distance.meshToSurface, distance.cell));
     json["surface_to_mesh_cells"] = toJson(inCells(distance.surfaceToMesh, distance.cell));
     json["normal_degrees"] = toJson(distance.normalDegrees);
+    if (distance.colourSamples > 0) json["colour_delta_e"] = toJson(distance.colourDifference);
     json["cell"] = distance.cell;
     json["certified_error_max"] = distance.certifiedErrorMax;
     json["samples"] = distance.samples;
@@ -109,6 +116,11 @@ std::string distanceTable(const SurfaceDistance& distance) {
     const Quantiles& degrees = distance.normalDegrees;
     text += fmt::format("  {:<16} {:>11.2f} {:>11.2f} {:>11.2f} {:>11.2f}\n", "normals, degrees", degrees.p50,
                         degrees.p95, degrees.p99, degrees.max);
+    if (distance.colourSamples > 0) {
+        const Quantiles& colour = distance.colourDifference;
+        text += fmt::format("  {:<16} {:>11.2f} {:>11.2f} {:>11.2f} {:>11.2f}\n", "colour, \u0394E", colour.p50,
+                            colour.p95, colour.p99, colour.max);
+    }
     text += fmt::format("  {:<16} {:>47}\n  {:<16} {:>47.5f}", "certified", formatLength(distance.certifiedErrorMax),
                         "  in cells", distance.certifiedErrorMax / distance.cell);
     return text;

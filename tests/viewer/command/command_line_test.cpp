@@ -282,6 +282,10 @@ TEST_F(CommandLine, BuildReportsWhatProgramsRelyOn) {
         EXPECT_EQ(info[field], json[field]) << field;
     EXPECT_EQ(info["level"].size(), json["levels"].get<size_t>());
     EXPECT_EQ(info["level"].back()["certified_error_max"], json["certified_error_max"]);
+    EXPECT_GT(info["colour_stored_bytes"], 1000);
+    EXPECT_GT(info["geometry_stored_bytes"], 1000);
+    EXPECT_LT(info["geometry_stored_bytes"].get<uint64_t>() + info["colour_stored_bytes"].get<uint64_t>(),
+              json["file_bytes"].get<uint64_t>());
     EXPECT_EQ(info["level"].back()["slab_leaves"], 0) << "the finest level is the mesh";
 
     const Json verified = Json::parse(run({"verify", file.string(), "--json"}).out);
@@ -314,6 +318,9 @@ TEST_F(CommandLine, VerifyMeasuresAgainstTheMesh) {
     EXPECT_LT(degrees["p99"], 30);
     const Ran table = run({"verify", dataset().string(), "--against", ball().string(), "--samples", "2000"});
     EXPECT_NE(table.out.find("normals, degrees"), std::string::npos) << table.out;
+    EXPECT_NE(table.out.find("colour"), std::string::npos) << table.out;
+    EXPECT_LE(json["colour_delta_e"]["p50"], json["colour_delta_e"]["max"]);
+    EXPECT_LT(json["colour_delta_e"]["p95"], 1) << "vertices keep their colours";
 }
 
 TEST_F(CommandLine, VerifyRefusesAnotherMesh) {
