@@ -49,9 +49,8 @@ Error named(Error error, const std::filesystem::path& folder) {
     const size_t dash = name.rfind('-');
     if (error.code != ErrorCode::InvalidInput || part.parent_path() != folder || dash == std::string::npos)
         return error;
-    error.message =
-        fmt::format("is damaged, cut off or lost: delete {} and run \"vcp build-step {} {} --plan {}\" again",
-                    part.string(), name.substr(0, dash), name.substr(dash + 1), folder.string());
+    error.message = fmt::format("is damaged, cut off or lost: delete {} and run the step \"{} {}\" of this plan again",
+                                part.string(), name.substr(0, dash), name.substr(dash + 1));
     return error;
 }
 

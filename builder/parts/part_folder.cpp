@@ -25,9 +25,7 @@ std::string uniqueName() {
 
 std::filesystem::path PartName::folder() const { return plan / fmt::format("{}-{}", stage, number); }
 
-std::string PartName::command() const {
-    return fmt::format("vcp build-step {} {} --plan {}", stage, number, plan.string());
-}
+std::string PartName::step() const { return fmt::format("{} {}", stage, number); }
 
 bool isDone(const PartName& part) {
     std::error_code ignored;
@@ -70,7 +68,7 @@ Result<void> NewPart::rename() {
 Result<DonePart> openPart(const PartName& part) {
     if (!isDone(part))
         return Error{.code = ErrorCode::Usage,
-                     .message = fmt::format("is not done; run \"{}\" first", part.command()),
+                     .message = fmt::format("is not done; run the step \"{}\" of this plan first", part.step()),
                      .file = part.folder().string()};
     DonePart done{std::make_unique<TempSpace>(part.folder(), 0, FolderUse::Read), {}};
     VCP_TRY(done.space->folder().take());

@@ -18,8 +18,8 @@ struct PartName {
     unsigned number = 0;
 
     [[nodiscard]] std::filesystem::path folder() const;
-    /// Returns the command that runs it.
-    [[nodiscard]] std::string command() const;
+    /// Returns "STAGE NUMBER", as messages and those who run it name it.
+    [[nodiscard]] std::string step() const;
 };
 
 /// Whether a part is complete: an empty folder of its name, as schedulers make them, is not.
