@@ -45,7 +45,12 @@ PageLoader::PageLoader(std::shared_ptr<const PageSource> source, const LoaderOpt
     : source_(std::move(source)), options_(options), queue_(options.retry), idle_(options.threads) {
     for (uint32_t& threads : idle_) working_ += threads = std::max(threads, 1u);
     shareMemory();
-    for (uint32_t i = 0, threads = working_; i < threads; ++i) threads_.emplace_back([this] { work(); });
+    const uint32_t threads = working_;
+    while (threads_.size() < threads)
+        threads_.emplace_back([this, threads] {
+            giveWay(threads);
+            work();
+        });
 }
 
 PageLoader::~PageLoader() {
@@ -192,7 +197,6 @@ std::vector<Result<PageBytes>> PageLoader::read(Run run) const {
 }
 
 void PageLoader::work() {
-    giveWay(uint32_t(threads_.size()));
     std::unique_lock lock(mutex_);
     while (!stop_) {
         const double now = steadySeconds();
