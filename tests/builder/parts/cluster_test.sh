@@ -81,12 +81,3 @@ chmod +x bin/sbatch
 PATH=$work/bin:$PATH VCP=$vcp "$scripts/vcp-slurm.sh" "a folder/slurm.vcp.parts" --mem=1G >said || fail "$(cat said sbatch_said)"
 same "a folder/slurm.vcp" "vcp-slurm.sh"
 [ "$(wc -l <said)" = 4 ] || fail "$(cat said)"
-
-if command -v snakemake >found; then
-    "$vcp" build-plan scan.ply -o "a folder/snake.vcp" --parts 3 >said
-    HOME=$work snakemake --snakefile "$scripts/Snakefile" --config plan="a folder/snake.vcp.parts" vcp="$vcp" --cores 2 \
-        >said 2>&1 || fail "$(cat said)"
-    same "a folder/snake.vcp" "Snakefile"
-else
-    echo "skipped: snakemake is not here"
-fi
