@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <memory>
 
@@ -72,7 +73,8 @@ public:
     LitDrawing(const LitScene& scene, HostPicture& picture)
         : picture_(picture),
           surfaces_(scene.surfaces),
-          planes_(picture.colours.size(), std::ranges::any_of(scene.surfaces, &HostSurface::isFarDrawn)),
+          planes_(picture.colours.size(),
+                  std::any_of(scene.surfaces.begin(), scene.surfaces.end(), std::mem_fn(&HostSurface::isFarDrawn))),
           frame_(scene.frame),
           reach_(scene.occlusionReach) {
         for (const HostLayer& layer : scene.layers) {
