@@ -107,6 +107,12 @@ if(TARGET vcp)
     install(FILES ${desktop}/vcp.thumbnailer DESTINATION ${CMAKE_INSTALL_DATADIR}/thumbnailers COMPONENT tools)
 endif()
 
+# The viewer for browsers, for `vcp publish`, where its target was built.
+if(TARGET vcp AND TARGET web)
+    get_target_property(web_files web VCP_FILES)
+    install(FILES ${web_files} DESTINATION ${CMAKE_INSTALL_DATADIR}/vcp/web COMPONENT tools OPTIONAL)
+endif()
+
 # What the program wrote about itself.
 if(TARGET vcp_manual)
     set(zsh zsh/site-functions)

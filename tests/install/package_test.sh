@@ -71,6 +71,10 @@ cp "$here/octahedron.off" .
 [ "$(command -v vcp)" = "$usr/bin/vcp" ]
 quietly vcp build octahedron.off -o "of eight.vcp" --cell 0.05 --progress none
 quietly vcp verify "of eight.vcp"
+if [ -e "$build/web/vcp.wasm" ]; then
+    quietly vcp publish "of eight.vcp" -o site
+    cmp "of eight.vcp" site/scan.vcp
+fi
 
 # What a desktop does: it knows the file by its first bytes, and asks for a small picture of it.
 share=$usr/share

@@ -75,3 +75,44 @@ export class Orbit {
         return { x: width / 2 + dot(to, right) * scale, y: height / 2 - dot(to, up) * scale, depth };
     }
 }
+
+/// A light that follows the camera: from which side (0: the camera's, positive: from the right) and from how far above,
+/// in degrees.
+export class Light {
+    constructor(side = -25, above = 33.7) {
+        this.set(side, above);
+    }
+    set(side, above) {
+        this.side = ((side + 180) % 360 + 360) % 360 - 180;
+        this.above = Math.min(Math.max(above, -90), 90);
+    }
+    /// Follows a drag by pixels of a picture so many pixels high.
+    turn(dx, dy, height) {
+        this.set(this.side + 180 * dx / height, this.above - 180 * dy / height);
+    }
+    /// Unit, towards it, in the camera's axes: right, up, back.
+    direction() {
+        const [a, e] = [this.side, this.above].map(x => x * Math.PI / 180);
+        return [Math.sin(a) * Math.cos(e), Math.sin(e), Math.cos(a) * Math.cos(e)];
+    }
+    toText() {
+        return `${Math.round(this.side * 10) / 10},${Math.round(this.above * 10) / 10}`;
+    }
+    /// Returns false where the text is none.
+    fromText(text) {
+        const n = text.split(',').map(Number);
+        if (n.length !== 2 || !n.every(Number.isFinite)) return false;
+        this.set(n[0], n[1]);
+        return true;
+    }
+}
+
+/// Returns the section that a text names, { normal, offset }, or null: an axis, `x` to keep what lies beyond the plane
+/// and `-x` what lies before it, and where it cuts the box, 0 to 1: `-x,0.5`.
+export function sectionOf(text, boundsMin, boundsMax) {
+    const match = /^(-?)([xyz]),([0-9.]+)$/.exec(text ?? '');
+    if (!match || !(Number(match[3]) <= 1)) return null;
+    const axis = 'xyz'.indexOf(match[2]), sign = match[1] ? -1 : 1;
+    const place = boundsMin[axis] + Number(match[3]) * (boundsMax[axis] - boundsMin[axis]);
+    return { normal: [0, 1, 2].map(i => (i === axis ? sign : 0)), offset: sign * place };
+}

@@ -55,11 +55,14 @@ export class Ranges {
         const abort = new AbortController();
         signal?.addEventListener('abort', () => abort.abort(), { once: true });
         ++this.requests;
-        const last = (this.size === null ? offset + bytes : Math.min(offset + bytes, this.size)) - 1;
+        const end = () => (this.size === null ? offset + bytes : Math.min(offset + bytes, this.size));
         const answer = await this.fetch(this.url, {
-            headers: { Range: `bytes=${offset}-${last}` },
+            headers: { Range: `bytes=${offset}-${end() - 1}` },
             cache: anew ? 'reload' : 'default',
             signal: abort.signal,
+        }).catch(() => {
+            // Browsers do not tell a page which of these it is.
+            throw new Error(`${this.url}: the server cannot be reached, lets no other site's pages in, or compresses ranges`);
         });
         try {
             this.check(answer, offset);
@@ -69,8 +72,10 @@ export class Ranges {
         }
         const got = new Uint8Array(await answer.arrayBuffer());
         this.bytes += got.length;
-        if (got.length > last - offset + 1) throw new ServerError(`${this.url}: the server sent more bytes than asked for`);
-        if (this.size !== null && got.length < last - offset + 1)
+        // The first answer says where the file ends.
+        const expected = end() - offset;
+        if (got.length > expected) throw new ServerError(`${this.url}: the server sent more bytes than asked for`);
+        if (this.size !== null && got.length < expected)
             throw new Error(`${this.url}: the answer was cut off`);
         return got;
     }

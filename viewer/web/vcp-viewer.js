@@ -1,9 +1,13 @@
 // <vcp-viewer src="scan.vcp">: a scan in a page, streamed and drawn by a worker.
-import { Orbit, kFieldOfView, difference, length } from './camera.js';
+import { Light, Orbit, kFieldOfView, difference, length, sectionOf } from './camera.js';
+import { kMarkup, kStyle } from './markup.js';
 
 const kModes = { lit: 0, clay: 1, unlit: 2, normals: 3, level: 7, error: 8 };
 const kMovingScale = 0.4; // of the resolution, while the view moves
-const kRestMs = 160;      // without a movement: the view is at rest
+const kOcclusionRays = 8; // a pixel
+const kRestMs = 160; // without a movement: the view is at rest
+const kSaidMs = 4000; // a line that answers a button stands as long
+const kTapMs = 300, kTapPixels = 24; // two taps so near each other are one double tap
 const kMostPixels = 1.6e6;
 const kPhoneBudget = 64 << 20, kBudget = 192 << 20; // of decoded pages; the module takes at most as much again
 
@@ -12,78 +16,19 @@ const kTheme = {
     light: { top: [0.78, 0.81, 0.85], bottom: [0.92, 0.93, 0.95] },
 };
 
-const kStyle = `
-:host { display: block; position: relative; width: 100%; height: 100%; min-height: 160px; overflow: hidden;
-    font: 14px/1.4 Inter, system-ui, sans-serif; --ground: #f6f7f9; --raised: #ffffffe8; --control: #e6e9ee;
-    --hovered: #d6dbe2; --line: #d9dde3; --ink: #1b1f26; --dim: #5d6673; --accent: #0b66d6; --problem: #c62f21;
-    background: var(--ground); color: var(--ink); color-scheme: light; }
-:host([data-theme="dark"]) { --ground: #1a1c20; --raised: #24272de8; --control: #30343b; --hovered: #3c424b;
-    --line: #32363d; --ink: #eceef1; --dim: #9aa2ad; --accent: #4da3ff; --problem: #ff6b5e; color-scheme: dark; }
-canvas { position: absolute; inset: 0; width: 100%; height: 100%; touch-action: none; cursor: grab; }
-canvas:active { cursor: grabbing; }
-canvas:focus-visible { outline: 2px solid var(--accent); outline-offset: -2px; }
-:host([data-tool="measure"]) canvas { cursor: crosshair; }
-svg { position: absolute; inset: 0; width: 100%; height: 100%; pointer-events: none; }
-svg line { stroke: #000; stroke-opacity: .55; stroke-width: 4; stroke-linecap: round; }
-svg line + line { stroke: #ffd24d; stroke-opacity: 1; stroke-width: 2; }
-svg circle { fill: #ffd24d; stroke: #0009; stroke-width: 1.5; }
-.bar { position: absolute; left: 50%; bottom: max(14px, env(safe-area-inset-bottom)); transform: translateX(-50%);
-    display: flex; gap: 4px; padding: 5px; border-radius: 12px; background: var(--raised); border: 1px solid var(--line);
-    backdrop-filter: blur(10px); box-shadow: 0 4px 18px #0003; max-width: calc(100% - 16px); }
-button, select { font: inherit; font-weight: 500; color: var(--ink); background: transparent; border: 0; border-radius: 8px;
-    height: 38px; min-width: 38px; padding: 0 11px; cursor: pointer; white-space: nowrap; }
-select { background: var(--control); }
-button:hover, select:hover { background: var(--hovered); }
-button[aria-pressed="true"] { background: var(--accent); color: #fff; }
-:host([data-theme="dark"]) button[aria-pressed="true"] { color: #06192e; }
-button:focus-visible, select:focus-visible { outline: 2px solid var(--accent); }
-.status { position: absolute; left: 14px; top: 12px; padding: 5px 11px; border-radius: 9px; background: var(--raised);
-    color: var(--dim); font-size: 13px; font-variant-numeric: tabular-nums; max-width: calc(100% - 50px); }
-.status[data-problem] { color: var(--problem); font-weight: 500; }
-.status:empty { display: none; }
-.scale { position: absolute; left: 16px; bottom: 22px; font-size: 12px; color: var(--ink); pointer-events: none;
-    border: 2px solid currentColor; border-top: 0; height: 6px; box-sizing: border-box; text-align: center; }
-.scale span { position: absolute; left: 0; right: 0; bottom: 8px; white-space: nowrap; }
-.note { position: absolute; transform: translate(-50%, -50%); width: 26px; height: 26px; min-width: 0; padding: 0;
-    border-radius: 50%; background: var(--accent); color: #fff; font-size: 13px; font-weight: 600; box-shadow: 0 1px 6px #0006; }
-.card { position: absolute; right: 14px; top: 12px; width: min(300px, calc(100% - 28px)); box-sizing: border-box;
-    padding: 14px 16px; border-radius: 12px; background: var(--raised); border: 1px solid var(--line); }
-.card h2 { margin: 0 0 4px; font-size: 15px; } .card p { margin: 0; color: var(--dim); }
-.corners { display: block; width: 15px; height: 15px; background:
-    linear-gradient(currentColor 0 0) 0 0 / 6px 2px, linear-gradient(currentColor 0 0) 0 0 / 2px 6px,
-    linear-gradient(currentColor 0 0) 100% 0 / 6px 2px, linear-gradient(currentColor 0 0) 100% 0 / 2px 6px,
-    linear-gradient(currentColor 0 0) 0 100% / 6px 2px, linear-gradient(currentColor 0 0) 0 100% / 2px 6px,
-    linear-gradient(currentColor 0 0) 100% 100% / 6px 2px, linear-gradient(currentColor 0 0) 100% 100% / 2px 6px;
-    background-repeat: no-repeat; }
-@media (max-width: 620px) { .scale { bottom: 78px; } .bar button, .bar select { padding: 0 9px; } }
-@media (prefers-reduced-motion: reduce) { * { transition: none !important; } }
-`;
-
-const kMarkup = `
-<canvas tabindex="0" role="application"
-    aria-label="Three-dimensional view. Arrow keys turn, plus and minus zoom, shift and arrow keys move, F fits."></canvas>
-<svg aria-hidden="true"></svg>
-<div class="notes"></div>
-<div class="status" role="status" aria-live="polite"></div>
-<div class="scale" hidden><span></span></div>
-<div class="bar" role="toolbar" aria-label="View">
-    <button data-do="fit" title="Show all (F)">Fit</button>
-    <select aria-label="Shading"><option value="lit">Lit</option><option value="clay">Clay</option>
-        <option value="unlit">Colours</option><option value="normals">Normals</option><option value="level">Levels</option>
-        <option value="error">Error</option></select>
-    <button data-do="measure" aria-pressed="false" title="Measure a distance (M)">Measure</button>
-    <button data-do="link" title="Copy a link to this view">Link</button>
-    <button data-do="full" title="Full screen" aria-label="Full screen"><span class="corners"></span></button>
-</div>
-<div class="card" hidden><h2></h2><p></p></div>`;
-
 /// A length for people: three digits.
 function lengthText(x) {
     return x === 0 ? '0' : Number(x.toPrecision(3)).toString();
 }
 
+/// A length and by how much it may be off, which says how many digits of the length are worth reading.
+function measureText(x, error) {
+    const decimals = Math.min(Math.max(1 - Math.floor(Math.log10(error)), 0), 12);
+    return `${x.toFixed(decimals)} ± ${error.toFixed(decimals)}`;
+}
+
 export class VcpViewer extends HTMLElement {
-    static observedAttributes = ['src', 'mode', 'annotations', 'theme'];
+    static observedAttributes = ['src', 'mode', 'annotations', 'theme', 'light', 'shadows', 'occlusion', 'section'];
 
     constructor() {
         super();
@@ -92,13 +37,16 @@ export class VcpViewer extends HTMLElement {
         const find = what => root.querySelector(what);
         this.parts = {
             canvas: find('canvas'), lines: find('svg'), notes: find('.notes'), status: find('.status'), scale: find('.scale'),
-            bar: find('.bar'), select: find('select'), card: find('.card'),
+            bar: find('.bar'), select: find('.bar select'), card: find('.card'), panel: find('.panel'),
         };
         this.orbit = new Orbit();
+        this.light = new Light();
         this.info = null;
         this.number = 0;
         this.points = []; // of the measurement
         this.notes = [];
+        this.problems = {}; // by what has one: page, scan, notes
+        this.said = this.loading = '';
         this.picks = new Map();
         this.listen();
     }
@@ -117,11 +65,19 @@ export class VcpViewer extends HTMLElement {
         this.dark.addEventListener('change', this.onScheme);
         this.resizing = new ResizeObserver(() => this.look(false));
         this.resizing.observe(this);
+        this.onHidden = () => this.worker?.postMessage({ type: 'hide', hidden: document.hidden });
+        document.addEventListener('visibilitychange', this.onHidden);
+        this.onOnline = () => this.worker?.postMessage({ type: 'retry' });
+        addEventListener('online', this.onOnline);
         this.chooseTheme();
+        this.light.fromText(this.getAttribute('light') ?? '');
+        this.showControls();
         if (this.src) this.open();
     }
     disconnectedCallback() {
         this.dark.removeEventListener('change', this.onScheme);
+        document.removeEventListener('visibilitychange', this.onHidden);
+        removeEventListener('online', this.onOnline);
         this.resizing.disconnect();
         this.worker?.terminate();
         this.worker = null;
@@ -131,8 +87,33 @@ export class VcpViewer extends HTMLElement {
         if (name === 'src') this.open();
         if (name === 'annotations') this.readNotes();
         if (name === 'theme') this.chooseTheme();
-        if (name === 'mode') this.parts.select.value = this.mode;
-        this.look(false);
+        if (name === 'light') this.light.fromText(now ?? '');
+        this.showControls();
+        if (['light', 'section'].includes(name)) this.moved();
+        else this.look(false);
+    }
+
+    /// Sets the controls to what is shown.
+    showControls() {
+        this.parts.select.value = this.mode;
+        const control = name => this.parts.panel.querySelector(`[data-set="${name}"]`);
+        control('side').value = this.light.side;
+        control('above').value = this.light.above;
+        control('shadows').checked = this.hasAttribute('shadows');
+        control('occlusion').checked = this.hasAttribute('occlusion');
+        const [axis, place] = (this.getAttribute('section') ?? ',0.5').split(',');
+        control('axis').value = axis;
+        control('place').value = 100 * Number(place);
+        control('place').disabled = axis === '';
+    }
+    /// Does what a control of the panel was set to.
+    changed(control) {
+        const { panel } = this.parts, value = name => panel.querySelector(`[data-set="${name}"]`).value;
+        const what = control.dataset.set;
+        if (what === 'shadows' || what === 'occlusion') this.toggleAttribute(what, control.checked);
+        else if (what === 'side' || what === 'above') this.setAttribute('light', `${value('side')},${value('above')}`);
+        else if (value('axis') === '') this.removeAttribute('section');
+        else this.setAttribute('section', `${value('axis')},${value('place') / 100}`);
     }
 
     chooseTheme() {
@@ -143,20 +124,38 @@ export class VcpViewer extends HTMLElement {
     tell(type, detail) {
         this.dispatchEvent(new CustomEvent(type, { detail, bubbles: true }));
     }
-    say(text, isProblem = false) {
-        this.parts.status.textContent = text;
-        this.parts.status.toggleAttribute('data-problem', isProblem);
-        if (isProblem) this.tell('error', { message: text });
+    /// Shows what matters most: a problem, what a button did, what to do next, how far loading is.
+    showStatus() {
+        const { status } = this.parts, problem = this.problems.page ?? this.problems.scan ?? this.problems.notes;
+        status.textContent = problem ?? (this.said || this.measured() || this.loading);
+        status.toggleAttribute('data-problem', problem !== undefined);
+    }
+    /// A problem stands until what has it is right again.
+    fail(what, message) {
+        this.problems[what] = message;
+        this.showStatus();
+        this.tell('error', { message });
+    }
+    say(text) {
+        this.said = text;
+        this.showStatus();
+        clearTimeout(this.saying);
+        this.saying = setTimeout(() => {
+            this.said = '';
+            this.showStatus();
+        }, kSaidMs);
     }
 
     open() {
         this.worker?.terminate();
         this.info = null;
         this.points = [];
-        this.say('Opening…');
+        this.problems = {};
+        this.loading = 'Opening…';
+        this.showStatus();
         this.worker = new Worker(new URL('./worker.js', import.meta.url), { type: 'module' });
         this.worker.onmessage = ({ data }) => this.hear(data);
-        this.worker.onerror = event => this.say(event.message || 'the viewer could not be loaded', true);
+        this.worker.onerror = event => this.fail('scan', event.message || 'the viewer could not be loaded');
         const isPhone = matchMedia('(pointer: coarse)').matches;
         this.worker.postMessage({
             type: 'open', url: new URL(this.src, document.baseURI).href, wasm: new URL('./vcp.wasm', import.meta.url).href,
@@ -176,12 +175,15 @@ export class VcpViewer extends HTMLElement {
         } else if (message.type === 'picture') this.show(message);
         else if (message.type === 'settled') {
             if (message.number !== this.number) return;
-            this.say('');
+            this.loading = '';
+            delete this.problems.scan;
+            this.showStatus();
             this.tell('settled', message.update);
         } else if (message.type === 'picked') {
             this.picks.get(message.id)?.(message.hit);
             this.picks.delete(message.id);
-        } else if (message.type === 'problem' || message.type === 'error') this.say(message.message, true);
+        } else if (message.type === 'problem') this.fail('page', message.message);
+        else if (message.type === 'error') this.fail('scan', message.message);
     }
 
     show({ width, height, pixels, number, samples, update, fetched, memoryBytes }) {
@@ -191,8 +193,8 @@ export class VcpViewer extends HTMLElement {
             canvas.height = height;
         }
         canvas.getContext('2d').putImageData(new ImageData(pixels, width, height), 0, 0);
-        if (!update.settled && !this.parts.status.hasAttribute('data-problem'))
-            this.say(`Loading, ${(fetched.bytes / 1e6).toFixed(1)} MB`);
+        this.loading = update.settled ? '' : `Loading, ${(fetched.bytes / 1e6).toFixed(1)} MB`;
+        this.showStatus();
         this.drawOver();
         this.tell('progress', { number, samples, ...update, ...fetched, memoryBytes });
     }
@@ -219,35 +221,38 @@ export class VcpViewer extends HTMLElement {
         const { up, forward } = this.orbit.axes(), mode = kModes[this.mode] ?? 0, theme = kTheme[this.dataset.theme];
         this.worker.postMessage({
             type: 'look', width, height, moving, mode, number: ++this.number,
-            numbers: [...this.orbit.eye(), ...forward, ...up, kFieldOfView, width, height, moving ? 1 : 0.5, mode,
-                0, 0, ...theme.top, ...theme.bottom],
+            eye: this.orbit.eye(), forward, up, fov: kFieldOfView, errorPixels: moving ? 1 : 0.5,
+            shadows: this.hasAttribute('shadows'),
+            occlusionRays: this.hasAttribute('occlusion') && !moving ? kOcclusionRays : 0,
+            top: theme.top, bottom: theme.bottom, light: this.light.direction(),
+            section: sectionOf(this.getAttribute('section'), this.info.boundsMin, this.info.boundsMax),
         });
         this.drawOver();
     }
 
     /// Returns what is seen at a place of the element, in CSS pixels: { position, depth, error }, or null.
     pick(x, y) {
-        const { canvas } = this.parts;
         const key = `${performance.now()} ${Math.random()}`;
         return new Promise(done => {
             this.picks.set(key, done);
-            this.worker.postMessage({
-                type: 'pick', id: key, x: Math.min(canvas.width - 1, Math.max(0, Math.floor(x * canvas.width / this.clientWidth))),
-                y: Math.min(canvas.height - 1, Math.max(0, Math.floor(y * canvas.height / this.clientHeight))),
-            });
+            this.worker.postMessage({ type: 'pick', id: key, x: x / this.clientWidth, y: y / this.clientHeight });
         });
     }
 
+    /// What measuring says: what to do next, or the distance and by how much it may be off.
+    measured() {
+        if (this.dataset.tool !== 'measure') return '';
+        const [a, b] = this.points;
+        if (!b) return a ? 'Click the second point' : 'Click two points';
+        return measureText(length(difference(a.position, b.position)), a.error + b.error);
+    }
     async measureAt(x, y) {
         const hit = await this.pick(x, y);
         if (!hit) return;
         if (this.points.length === 2) this.points = [];
         this.points.push(hit);
         this.tell('pick', hit);
-        if (this.points.length === 2) {
-            const [a, b] = this.points;
-            this.say(`${lengthText(length(difference(a.position, b.position)))} ± ${lengthText(a.error + b.error)}`);
-        } else this.say('Click the second point');
+        this.showStatus();
         this.drawOver();
     }
 
@@ -260,7 +265,10 @@ export class VcpViewer extends HTMLElement {
             const ends = `x1="${at[0].x}" y1="${at[0].y}" x2="${at[1].x}" y2="${at[1].y}"`;
             svg += `<line ${ends}/><line ${ends}/>`;
         }
+        // The circles lie over the line, and the distance over both.
         for (const p of at) if (p) svg += `<circle cx="${p.x}" cy="${p.y}" r="5"/>`;
+        if (at.length === 2 && at[0] && at[1])
+            svg += `<text x="${(at[0].x + at[1].x) / 2}" y="${(at[0].y + at[1].y) / 2 - 10}">${this.measured()}</text>`;
         this.parts.lines.innerHTML = svg;
         this.notes.forEach(note => {
             const p = this.orbit.project(note.position, width, height);
@@ -278,6 +286,8 @@ export class VcpViewer extends HTMLElement {
         const file = this.getAttribute('annotations');
         this.parts.notes.replaceChildren();
         this.notes = [];
+        delete this.problems.notes;
+        this.showStatus();
         if (!file) return;
         try {
             const read = await (await fetch(new URL(file, document.baseURI))).json();
@@ -295,7 +305,7 @@ export class VcpViewer extends HTMLElement {
             });
             this.drawOver();
         } catch (error) {
-            this.say(`${file}: ${error.message}`, true);
+            this.fail('notes', `${file}: ${error.message}`);
         }
     }
     showNote(note) {
@@ -318,7 +328,7 @@ export class VcpViewer extends HTMLElement {
 
     listen() {
         const { canvas, bar, select } = this.parts, pointers = new Map();
-        let travelled = 0;
+        let travelled = 0, tapped = { time: -kTapMs, x: 0, y: 0 };
         const halves = (x, y) => [(x - this.clientWidth / 2) / (this.clientHeight / 2), (y - this.clientHeight / 2) / (this.clientHeight / 2)];
         canvas.onpointerdown = event => {
             canvas.setPointerCapture(event.pointerId);
@@ -337,13 +347,24 @@ export class VcpViewer extends HTMLElement {
                 const now = { x: event.offsetX, y: event.offsetY };
                 this.orbit.zoom(span(before) / span(now), ...halves((now.x + others[0].x) / 2, (now.y + others[0].y) / 2));
                 this.orbit.pan(dx / 2, dy / 2, this.clientHeight);
+            } else if (event.ctrlKey) {
+                this.light.turn(dx, dy, this.clientHeight);
+                this.setAttribute('light', this.light.toText());
             } else if (event.buttons & 6 || event.shiftKey) this.orbit.pan(dx, dy, this.clientHeight);
             else this.orbit.turn(dx, dy, this.clientHeight);
             this.moved();
         };
         canvas.onpointerup = canvas.onpointercancel = event => {
             pointers.delete(event.pointerId);
-            if (event.type === 'pointerup' && travelled < 6 && this.dataset.tool === 'measure') this.measureAt(event.offsetX, event.offsetY);
+            if (event.type !== 'pointerup' || event.button !== 0 || travelled >= 6) return;
+            const now = { time: event.timeStamp, x: event.offsetX, y: event.offsetY };
+            if (this.dataset.tool === 'measure') this.measureAt(now.x, now.y);
+            else if (now.time - tapped.time < kTapMs && Math.hypot(now.x - tapped.x, now.y - tapped.y) < kTapPixels) {
+                this.orbit.zoom(0.5, ...halves(now.x, now.y));
+                this.moved();
+                now.time = -kTapMs; // a third tap begins anew
+            }
+            tapped = now;
         };
         canvas.oncontextmenu = event => event.preventDefault();
         canvas.addEventListener('wheel', event => {
@@ -351,10 +372,6 @@ export class VcpViewer extends HTMLElement {
             this.orbit.zoom(Math.exp(Math.min(Math.max(event.deltaY, -300), 300) * 0.0016), ...halves(event.offsetX, event.offsetY));
             this.moved();
         }, { passive: false });
-        canvas.ondblclick = event => {
-            this.orbit.zoom(0.5, ...halves(event.offsetX, event.offsetY));
-            this.moved();
-        };
         canvas.onkeydown = event => {
             const step = 40, way = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }[event.key];
             if (way) this.orbit[event.shiftKey ? 'pan' : 'turn'](way[0] * step, way[1] * step, this.clientHeight);
@@ -371,10 +388,18 @@ export class VcpViewer extends HTMLElement {
             const what = event.target.closest('button')?.dataset.do;
             if (what === 'fit') this.fit();
             if (what === 'measure') this.toggleMeasuring();
+            if (what === 'more') this.togglePanel(event.target.closest('button'));
             if (what === 'link') this.copyLink();
             if (what === 'full') document.fullscreenElement ? document.exitFullscreen() : this.requestFullscreen();
         };
-        addEventListener('online', () => this.worker?.postMessage({ type: 'retry' }));
+        this.parts.panel.oninput = event => this.changed(event.target);
+    }
+
+    togglePanel(button) {
+        const { panel } = this.parts;
+        panel.hidden = !panel.hidden;
+        button.setAttribute('aria-pressed', String(!panel.hidden));
+        button.setAttribute('aria-expanded', String(!panel.hidden));
     }
 
     toggleMeasuring() {
@@ -382,7 +407,7 @@ export class VcpViewer extends HTMLElement {
         this.dataset.tool = measures ? 'measure' : '';
         this.points = [];
         this.parts.bar.querySelector('[data-do="measure"]').setAttribute('aria-pressed', String(measures));
-        this.say(measures ? 'Click two points' : '');
+        this.showStatus();
         this.drawOver();
     }
 }

@@ -8,7 +8,7 @@ const kMostBytes = 256 << 10; // of one request
 const kAtOnce = 4;           // requests
 const kSamples = 8;          // of a pixel, where a view is at rest
 
-let module, ranges, view = null, awake = null, fetching = 0, failed = null, drawn = null;
+let module, ranges, view = null, awake = null, fetching = 0, failed = null, drawn = null, hidden = false;
 const asked = new Set(); // offsets under way
 
 function post(type, more = {}, transfer = []) {
@@ -22,7 +22,9 @@ async function supply(stretches) {
 }
 
 async function open({ url, wasm, budgetBytes }) {
-    module = await Module.load(await fetch(wasm));
+    const program = await fetch(wasm);
+    if (!program.ok) throw new Error(`${wasm}: the server answers ${program.status}; copy the whole folder of the viewer`);
+    module = await Module.load(program);
     ranges = new Ranges(url);
     const lead = await ranges.read(0, kLead);
     module.begin(ranges.size, url, budgetBytes);
@@ -53,6 +55,13 @@ function wake() {
     awake = null;
 }
 
+/// A line for people. What ends an instance of WebAssembly is want of memory (wasm/thrown.cpp).
+function lineOf(error) {
+    if (error instanceof WebAssembly.RuntimeError || error instanceof RangeError)
+        return 'the browser has no more memory for this scan; a smaller `budget` may do';
+    return error.message;
+}
+
 /// Draws the view anew and shows it.
 function draw(update, samples) {
     const { width, height } = view;
@@ -63,6 +72,13 @@ function draw(update, samples) {
     }, [pixels.buffer]);
 }
 
+/// What is seen at a place of the picture, 0 to 1 from its upper left corner; null where the view has not been drawn.
+function hitAt({ x, y }) {
+    if (drawn === null || drawn.view !== view) return null;
+    const texel = (at, size) => Math.min(Math.max(Math.floor(at * size), 0), size - 1);
+    return module.pick(texel(x, view.width), texel(y, view.height));
+}
+
 async function run() {
     for (;;) {
         if (failed) {
@@ -71,8 +87,12 @@ async function run() {
             await new Promise(done => { awake = done; });
             continue;
         }
+        if (hidden) {
+            await new Promise(done => { awake = done; });
+            continue;
+        }
         const now = view;
-        module.look(now.numbers);
+        module.look(now);
         const update = module.update();
         fetchMissing();
         if (update.problem) post('problem', { message: update.problem });
@@ -86,7 +106,7 @@ async function run() {
             drawn.samples = samples === 0 ? kSamples : samples;
             if (samples > 0 && (samples & (samples - 1)) === 0) draw(update, samples);
         } else if (view === now) {
-            if (update.settled) post('settled', { number: now.number, update });
+            if (update.settled && !now.moving) post('settled', { number: now.number, update });
             await new Promise(done => { awake = done; });
         }
         // Messages of the page come in between.
@@ -100,12 +120,15 @@ self.onmessage = async ({ data }) => {
         else if (data.type === 'look') {
             const isFirst = view === null;
             view = data;
-            if (isFirst) run().catch(error => post('error', { message: error.message }));
+            if (isFirst) run().catch(error => post('error', { message: lineOf(error) }));
             else wake();
         } else if (data.type === 'pick') {
-            post('picked', { id: data.id, hit: drawn?.view.number === view?.number ? module.pick(data.x, data.y) : null });
+            post('picked', { id: data.id, hit: hitAt(data) });
+        } else if (data.type === 'hide') {
+            hidden = data.hidden; // nothing is drawn that nobody sees
+            wake();
         } else if (data.type === 'retry') wake();
     } catch (error) {
-        post('error', { message: error.message });
+        post('error', { message: lineOf(error) });
     }
 };

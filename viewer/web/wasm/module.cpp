@@ -102,7 +102,9 @@ EXPORT(vcp_info) const double* vcp_info() {
 }
 
 /// Sets what is to be drawn: eye, forward, up (three numbers each), vertical field of view, width, height, error in
-/// pixels, ShadingMode, shadows, rays of ambient occlusion, background at the top and at the bottom (three each).
+/// pixels, ShadingMode, shadows, rays of ambient occlusion, background at the top and at the bottom (three each),
+/// direction towards the light in the camera's axes (right, up, back), whether there is a section, its normal (three)
+/// and offset.
 EXPORT(vcp_look) void vcp_look(const double* from) {
     FrameRequest& request = opened.request;
     request.camera.eye = {from[0], from[1], from[2]};
@@ -117,6 +119,10 @@ EXPORT(vcp_look) void vcp_look(const double* from) {
     request.shading.occlusionRays = uint32_t(from[15]);
     request.shading.backgroundTop = {from[16], from[17], from[18]};
     request.shading.backgroundBottom = {from[19], from[20], from[21]};
+    request.shading.lightDirection = {from[22], from[23], from[24]};
+    request.sections.clear();
+    if (from[25] != 0) request.sections.push_back({{from[26], from[27], from[28]}, from[29]});
+    request.sectionCaps = from[25] != 0 ? Caps::Closed : Caps::None;
 }
 
 /// Takes in pages that have come. Returns bits: 1 a picture can be drawn, 2 settled, 4 awaits rays, 8 the cut changed.
