@@ -5,6 +5,7 @@ import assert from 'node:assert/strict';
 import fs from 'node:fs';
 import path from 'node:path';
 import { pathToFileURL } from 'node:url';
+import { compareDepth, readDepth } from './native_depth.mjs';
 
 const [web, scan, seeds, ...natives] = process.argv.slice(2);
 const { Module } = await import(pathToFileURL(path.join(web, 'module.js')));
@@ -48,7 +49,7 @@ async function opened(ranges, budget = 64 << 20) {
 
 function look(module, orbit, width = 320, height = 200, errorPixels = 0.5) {
     const { up, forward } = orbit.axes();
-    module.look([...orbit.eye(), ...forward, ...up, kFieldOfView, width, height, errorPixels, 0, 0, 0, 0, 0, 0, 0, 0, 0]);
+    module.look({ eye: orbit.eye(), forward, up, fov: kFieldOfView, width, height, errorPixels });
 }
 
 /// Goes on until nothing is missing, as the worker does; returns the last update.
@@ -117,21 +118,13 @@ await check('whole and close: settles within the budget, antialiases', async () 
 });
 
 for (const name of natives) await check(`the picture is the native one: ${name}`, async () => {
-    const text = fs.readFileSync(`${name}.pfm`), [width, height] = [320, 200], floats = text.subarray(text.length - 4 * width * height);
+    const [width, height] = [320, 200];
     const camera = JSON.parse(fs.readFileSync(`${name}.json`)), forward = camera.target.map((x, i) => x - camera.position[i]);
     const ranges = new Ranges('scan.vcp', server(file)), module = await opened(ranges), info = module.info();
-    module.look([...camera.position, ...forward, 0, 1, 0, camera.fov_degrees * Math.PI / 180, width, height, 0.5,
-        0, 0, 0, 0, 0, 0, 0, 0, 0]);
+    module.look({ eye: camera.position, forward, up: [0, 1, 0], fov: camera.fov_degrees * Math.PI / 180, width, height });
     await settle(module, ranges, 64 << 20);
-    const ours = module.depth(width, height);
-    let differ = 0, hits = 0;
-    for (let y = 0; y < height; ++y)
-        for (let x = 0; x < width; ++x) {
-            const theirs = floats.readFloatLE(4 * ((height - 1 - y) * width + x)), depth = ours[y * width + x];
-            const isHit = Number.isFinite(depth);
-            hits += isHit ? 1 : 0;
-            if (isHit !== Number.isFinite(theirs) || (isHit && Math.abs(depth - theirs) > 1e-3 * info.cell)) ++differ;
-        }
+    const theirs = readDepth(`${name}.pfm`, width, height);
+    const { differ, hits } = compareDepth(module.depth(width, height), theirs, 1e-3 * info.cell);
     console.log(`   ${differ} of ${width * height} pixels differ beyond 1e-3 cell; ${hits} hits`);
     assert.ok(hits > 3000 && differ <= width * height / 1000);
 });
@@ -147,6 +140,12 @@ await check('servers that do wrong end in one line', async () => {
     await says(() => new Response('', { status: 503 }), /answers 503/, 4);
     await says(answer => new Response(answer.body, { status: 206, headers: { 'Content-Range': 'bytes 7-9/99' } }), /another range/, 1);
     await says(answer => new Response(answer.body, { status: 206 }), /hides Content-Range/, 1);
+});
+
+await check('a small file is asked for once', async () => {
+    const ranges = quick(new Ranges('scan.vcp', server(file.subarray(0, 1000))));
+    assert.equal((await ranges.read(0, 64 << 10)).length, 1000);
+    assert.equal(ranges.requests, 1);
 });
 
 await check('a file replaced while it is seen', async () => {

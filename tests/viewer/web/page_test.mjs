@@ -1,0 +1,305 @@
+// A published page in headless Chromium: page_test.mjs VCP FOLDER PICTURES
+// FOLDER: as `vcp publish` makes it. PICTURES: folder for what is seen.
+import assert from 'node:assert/strict';
+import { execFileSync } from 'node:child_process';
+import fs from 'node:fs';
+import http from 'node:http';
+import path from 'node:path';
+import { pathToFileURL } from 'node:url';
+import zlib from 'node:zlib';
+import { Browser } from './browser.mjs';
+import { compareDepth, readDepth } from './native_depth.mjs';
+
+const [vcp, folder, pictures] = process.argv.slice(2);
+// Read as a module whatever the nearest package.json says.
+fs.copyFileSync(path.join(folder, 'camera.js'), path.join(pictures, 'camera.mjs'));
+const { Orbit, kFieldOfView } = await import(pathToFileURL(path.resolve(pictures, 'camera.mjs')));
+
+const kTypes = { '.html': 'text/html', '.js': 'text/javascript', '.wasm': 'application/wasm' };
+const kLead = 64 << 10; // bytes of the viewer's first request
+const scan = fs.readFileSync(path.join(folder, 'scan.vcp'));
+
+/// The server, what it does wrong with the scan, and what it was asked for.
+let wrong = '', asked = { scan: 0, bytes: 0, missing: [], methods: new Set() };
+function serve(request, answer) {
+    const name = new URL(request.url, 'http://here').pathname.slice(1) || 'index.html', file = path.join(folder, name);
+    asked.methods.add(request.method);
+    if (!fs.existsSync(file) || (name === 'scan.vcp' && wrong === 'missing')) {
+        asked.missing.push(name);
+        return answer.writeHead(404).end();
+    }
+    const headers = { 'Content-Type': kTypes[path.extname(name)] ?? 'application/octet-stream', 'Cache-Control': 'no-store' };
+    if (name !== 'scan.vcp') return answer.writeHead(200, headers).end(fs.readFileSync(file));
+    ++asked.scan;
+    if (wrong === 'down' || (wrong === 'gone' && asked.scan > 2)) return request.socket.destroy();
+    const range = /^bytes=(\d+)-(\d+)$/.exec(request.headers.range ?? '');
+    if (!range || wrong === 'ranges') return answer.writeHead(200, headers).end(scan);
+    const first = Number(range[1]), part = scan.subarray(first, Number(range[2]) + 1);
+    headers['Content-Range'] = `bytes ${first}-${first + part.length - 1}/${scan.length}`;
+    headers.ETag = wrong === 'replaced' && asked.scan > 1 ? '"b"' : '"a"';
+    if (request.headers.origin)
+        Object.assign(headers, { 'Access-Control-Allow-Origin': '*', 'Access-Control-Expose-Headers': 'Content-Range' });
+    asked.bytes += part.length;
+    if (wrong === 'gzip') return answer.writeHead(206, { ...headers, 'Content-Encoding': 'gzip' }).end(zlib.gzipSync(part));
+    answer.writeHead(206, headers).end(part);
+}
+async function started() {
+    const server = http.createServer(serve).listen(0, '127.0.0.1');
+    await new Promise(done => server.once('listening', done));
+    return `http://127.0.0.1:${server.address().port}/`;
+}
+const address = await started();
+
+const browser = new Browser(path.join(pictures, 'profile'));
+process.on('exit', () => browser.process.kill('SIGKILL'));
+
+/// Opens the page and waits until it has settled or shows a problem.
+async function open(width, height, { fault = '', link = '', touch = false } = {}) {
+    wrong = fault;
+    asked = { scan: 0, bytes: 0, missing: [], methods: new Set() };
+    const page = await browser.page(width, height, touch);
+    await page.call('Page.addScriptToEvaluateOnNewDocument', { source: `window.state = { picks: [] };
+        addEventListener('progress', event => { state.last = event.detail; state.first ??= event.detail; });
+        addEventListener('settled', event => { state.settled = event.detail; });
+        addEventListener('pick', event => state.picks.push(event.detail));
+        addEventListener('error', event => { if (event.detail?.message) state.problem = event.detail.message; });
+        addEventListener('DOMContentLoaded', () => {
+            window.viewer = document.querySelector('vcp-viewer');
+            window.part = name => viewer.shadowRoot.querySelector(name);
+        });` });
+    await page.call('Page.navigate', { url: address + link });
+    await settle(page);
+    return page;
+}
+async function settle(page) {
+    await page.until('Boolean(window.state?.settled || window.state?.problem)');
+}
+/// Does what an expression says, and waits until the view has settled after it.
+async function change(page, expression) {
+    await page.evaluate(`state.settled = state.problem = null; ${expression}`);
+    await settle(page);
+}
+/// A page of the good server: it did what it had to, and its console is empty.
+async function closeGood(page) {
+    assert.equal(await page.evaluate('state.problem ?? null'), null);
+    assert.deepEqual(page.errors, []);
+    assert.deepEqual(asked.missing, [], 'nothing is asked for that is not there');
+    assert.deepEqual([...asked.methods], ['GET'], 'nothing is asked beforehand');
+    await page.close();
+}
+const shown = page => page.evaluate(`part('canvas').toDataURL()`);
+const status = page => page.evaluate(`part('.status').textContent`);
+
+/// What the page needs for its first picture and until it rests, and that it all fits in.
+async function looks(width, height, touch) {
+    const page = await open(width, height, { touch });
+    const { first, last } = await page.evaluate('({ first: state.first, last: state.last })');
+    console.log(`${width} x ${height}: first picture ${first.requests} requests, ${first.bytes} bytes; settled ${asked.scan} ` +
+        `requests, ${asked.bytes} bytes of ${scan.length}; ${last.memoryBytes} bytes of memory`);
+    assert.ok(first.requests <= 3 && first.bytes <= 400e3);
+    assert.equal(last.requests, asked.scan);
+    assert.equal(last.bytes, asked.bytes);
+    assert.ok(last.errorPixels <= 0.5 && last.samples === 8);
+    if (scan.length <= kLead) assert.deepEqual([asked.scan, asked.bytes], [1, scan.length], 'a small scan is fetched once');
+    await page.picture(path.join(pictures, `page_${width}.png`));
+    await page.evaluate(`part('[data-do="more"]').click()`);
+    // Nothing lies outside of the page.
+    const outside = await page.evaluate(`[...viewer.shadowRoot.querySelectorAll('.bar > *, .panel, .scale')].filter(x => {
+        const box = x.getBoundingClientRect();
+        return box.left < 0 || box.top < 0 || box.right > ${width} || box.bottom > ${height};
+    }).map(x => x.className || x.textContent)`);
+    assert.deepEqual(outside, []);
+    await page.picture(path.join(pictures, `panel_${width}.png`));
+    await closeGood(page);
+}
+
+/// Light, shadows, sections and modes change the picture, and the controls follow.
+async function lights() {
+    const page = await open(320, 200);
+    let before = await shown(page);
+    for (const [name, value] of [['light', '60,20'], ['shadows', ''], ['occlusion', ''], ['section', '-x,0.5'], ['mode', 'clay']]) {
+        await change(page, `viewer.setAttribute('${name}', '${value}')`);
+        const now = await shown(page);
+        assert.notEqual(now, before, name);
+        before = now;
+    }
+    await page.evaluate(`part('[data-do="more"]').click()`);
+    assert.deepEqual(await page.evaluate(`['side', 'above', 'axis', 'place'].map(x => part('[data-set="' + x + '"]').value)`),
+        ['60', '20', '-x', '50']);
+    await closeGood(page);
+}
+
+const kCameras = { whole: [0, 0.86, 0, 8, 0.5, 0.4], close: [0, 1.1, 0, 1.6, 0.3, 0.35] };
+/// The depth of each pixel and two measured points, against those of the program; a link leads to the same picture.
+async function measures(name, width, height) {
+    const page = await open(width, height), orbit = new Orbit(), camera = kCameras[name].join(',');
+    assert.ok(orbit.fromText(camera));
+    await change(page, `viewer.camera = '${camera}'`);
+    const file = path.join(pictures, `${name}.json`), pfm = path.join(pictures, `${name}.pfm`), eye = orbit.eye();
+    fs.writeFileSync(file, JSON.stringify({ position: eye, target: orbit.target, fov_degrees: kFieldOfView * 180 / Math.PI }));
+    execFileSync(vcp, ['render', path.join(folder, 'scan.vcp'), '--device', 'host', '--camera', file, '--size',
+        `${width}x${height}`, '--depth', pfm, '-o', path.join(pictures, `${name}.png`), '--overwrite', '--progress', 'none']);
+    const native = readDepth(pfm, width, height), cell = await page.evaluate('viewer.info.cell');
+    const ours = await page.evaluate(`Promise.all(Array.from({ length: ${width * height} }, (_, i) =>
+        viewer.pick(i % ${width} + 0.5, Math.floor(i / ${width}) + 0.5).then(hit => hit?.depth ?? null)))`);
+    const { differ, hits } = compareDepth(ours.map(depth => depth ?? Infinity), native, 1e-3 * cell);
+    console.log(`${name}: ${differ} of ${width * height} pixels differ beyond 1e-3 cell; ${hits} hits`);
+    assert.ok(hits > 3000 && differ <= width * height / 1000);
+
+    // Two clicks measure what lies under them.
+    await page.evaluate(`part('canvas').focus()`);
+    await page.key('m');
+    const { right, up, forward } = orbit.axes(), half = Math.tan(kFieldOfView / 2);
+    const isInside = i => [-1, 0, 1].every(dx => [-1, 0, 1].every(dy => Math.abs(native[i + dx + dy * width] - native[i]) < cell));
+    const isFree = i => i > 45 * width && i < 135 * width; // of the line above and the bar below
+    const inside = [...native.keys()].filter(i => isFree(i) && isInside(i));
+    const places = [0.25, 0.75].map(part => inside[Math.floor(part * inside.length)]).map(i => {
+        const x = i % width, y = Math.floor(i / width);
+        const across = (x + 0.5 - width / 2) / (height / 2) * half, above = (height / 2 - y - 0.5) / (height / 2) * half;
+        const ray = forward.map((to, i) => to + across * right[i] + above * up[i]), scale = native[y * width + x] / Math.hypot(...ray);
+        return { x, y, place: eye.map((from, i) => from + scale * ray[i]) };
+    });
+    for (const [i, { x, y }] of places.entries()) {
+        await page.click(x, y);
+        await page.until(`state.picks.length === ${i + 1}`);
+    }
+    const far = (a, b) => Math.hypot(...a.map((x, i) => x - b[i]));
+    const picks = await page.evaluate('state.picks'), distance = far(places[0].place, places[1].place);
+    for (const [i, { place }] of places.entries()) assert.ok(far(picks[i].position, place) <= 1e-3 * cell, `point ${i + 1}`);
+    const [length, error] = (await status(page)).split(' ± ').map(Number);
+    assert.ok(error > 0 && error < length / 100);
+    assert.ok(Math.abs(length - distance) <= error, `${length} instead of ${distance}`);
+    assert.equal(await page.evaluate(`part('svg text').textContent`), await status(page), 'it stands at the line as well');
+    await page.picture(path.join(pictures, `measured_${name}.png`));
+    await page.key('m');
+    assert.equal(await page.evaluate(`part('svg').childElementCount`), 0);
+
+    await page.evaluate(`part('[data-do="link"]').click()`);
+    const link = await page.evaluate('location.hash');
+    const seen = await shown(page);
+    await closeGood(page);
+    const other = await open(width, height, { link });
+    assert.equal(await other.evaluate('viewer.camera'), orbit.toText());
+    assert.equal(await shown(other), seen, 'the link leads to the same picture');
+    await closeGood(other);
+}
+
+/// Keys, fingers and the mouse move the camera.
+async function moves() {
+    const camera = page => page.evaluate(`viewer.camera.split(',').map(Number)`);
+    let page = await open(390, 844, { touch: true }), before = await camera(page);
+    const finger = (x, y) => ({ x, y, id: 0 }), thumb = (x, y) => ({ x, y, id: 1 });
+    const moved = async what => {
+        const now = await camera(page), changed = now.map((x, i) => Math.abs(x - before[i]) > 1e-6);
+        before = now;
+        return { target: changed.slice(0, 3).some(Boolean), distance: changed[3], turned: changed[4] || changed[5] };
+    };
+    await page.touch([[finger(150, 300)], [finger(200, 300)]]);
+    assert.deepEqual(await moved(), { target: false, distance: false, turned: true }, 'one finger turns');
+    const distance = before[3];
+    await page.touch([[finger(150, 300), thumb(250, 500)], [finger(100, 250), thumb(300, 550)]]);
+    assert.deepEqual(await moved(), { target: true, distance: true, turned: false }, 'two fingers zoom and move');
+    assert.ok(before[3] < distance);
+    await page.touch([[finger(200, 300)]]);
+    await page.touch([[finger(203, 302)]]);
+    assert.deepEqual(await moved(), { target: true, distance: true, turned: false }, 'a double tap comes nearer');
+    await page.call('Input.dispatchMouseEvent', { type: 'mouseMoved', x: 1, y: 1 });
+    await change(page, '');
+    await closeGood(page);
+
+    page = await open(320, 200);
+    before = await camera(page);
+    await page.evaluate(`part('canvas').focus()`);
+    await page.key('ArrowLeft');
+    assert.deepEqual(await moved(), { target: false, distance: false, turned: true });
+    await page.key('+');
+    assert.deepEqual(await moved(), { target: false, distance: true, turned: false });
+    await page.call('Input.dispatchMouseEvent', { type: 'mouseWheel', x: 60, y: 60, deltaX: 0, deltaY: -100 });
+    await page.until(`viewer.camera.split(',')[3] < ${before[3] * 0.99}`);
+    assert.deepEqual(await moved(), { target: true, distance: true, turned: false }, 'the wheel zooms to the cursor');
+    await page.key('f');
+    assert.deepEqual(await moved(), { target: true, distance: true, turned: false });
+    await closeGood(page);
+}
+
+/// Annotations open and close; what is wrong with their file is one line.
+async function annotates() {
+    const page = await open(390, 844), notes = [{ position: [0, 0.8, 0], title: 'Here', text: '<b>plain</b>' }];
+    const given = file => `viewer.setAttribute('annotations', 'data:application/json,' + encodeURIComponent('${file}'))`;
+    await page.evaluate(given(JSON.stringify(notes)));
+    await page.until(`part('.note') !== null`);
+    await page.evaluate(`part('.note').click()`);
+    assert.deepEqual(await page.evaluate(`[part('.card').hidden, part('.card h2').textContent, part('.card p').textContent,
+        part('.card b') === null]`), [false, 'Here', '<b>plain</b>', true], 'a text is no markup');
+    await page.picture(path.join(pictures, 'note.png'));
+    await page.evaluate(given('[{ "position": [0, 1] }]'));
+    await page.until('state.problem');
+    assert.match(await status(page), /annotation 1 has no position of three numbers/);
+    await page.evaluate(`viewer.removeAttribute('annotations'); state.problem = null`);
+    assert.equal(await status(page), '');
+    await closeGood(page);
+}
+
+/// What consoles complain of is heard, the page's and its workers'.
+async function hears() {
+    const page = await browser.page(320, 200, false);
+    await page.evaluate(`console.error('one'); setTimeout(() => { throw 'two'; });
+        new Worker(URL.createObjectURL(new Blob(['setTimeout(() => { console.error("three"); throw "four"; }, 100)'])))`);
+    for (const said of ['one', 'two', 'three', 'four']) {
+        for (let i = 0; i < 200 && !page.errors.some(error => error.includes(said)); ++i)
+            await new Promise(done => setTimeout(done, 50));
+        assert.ok(page.errors.some(error => error.includes(said)), said);
+    }
+    await page.close();
+}
+
+/// A server that does wrong is one line in the page, and is not asked on and on.
+async function complains() {
+    const faults = [['ranges', /ignores ranges/, 1], ['missing', /no such file/, 1], ['gzip', /compresses ranges/, 4],
+        ['down', /cannot be reached/, 8]]; // 4 attempts; Chromium repeats what a cut connection did not answer
+    if (scan.length > kLead) faults.push(['replaced', /was replaced/, 3]);
+    for (const [fault, expected, requests] of faults) {
+        const page = await open(320, 200, { fault });
+        const said = await status(page);
+        assert.match(said, expected, fault);
+        assert.ok(!said.includes('\n'));
+        assert.ok(asked.scan <= requests, `${fault}: ${asked.scan} requests`);
+        await page.close();
+    }
+}
+
+/// The network goes before all has come, and comes back.
+async function returns() {
+    const page = await open(320, 200, { fault: 'gone' });
+    assert.match(await status(page), /cannot be reached/);
+    assert.ok(await page.evaluate('Boolean(state.first)'), 'what came is drawn');
+    wrong = '';
+    await change(page, `dispatchEvent(new Event('online'))`);
+    assert.equal(await page.evaluate('state.problem'), null);
+    assert.equal(await status(page), '');
+    await page.close();
+}
+
+/// The scan lies on another server than the page.
+async function crosses() {
+    const page = await open(320, 200), other = await started();
+    await change(page, `viewer.src = '${other}scan.vcp'`);
+    assert.ok(await page.evaluate('viewer.info.triangles > 0'));
+    await closeGood(page);
+}
+
+await hears();
+await looks(1600, 1000, false);
+await looks(390, 844, true);
+await complains();
+await lights();
+if (scan.length > kLead) {
+    for (const name of Object.keys(kCameras)) await measures(name, 320, 200);
+    await moves();
+    await annotates();
+    await returns();
+    await crosses();
+}
+await browser.close();
+console.log('page_test: all checks passed');
+process.exit(0);

@@ -1,0 +1,19 @@
+#!/usr/bin/env bash
+# A published page in Chromium: page_test.sh NODE WEB_FOLDER VCP MAKE_SCAN FOLDER
+set -euo pipefail
+node=$1 web=$2 vcp=$3 make_scan=$4 folder=$5
+if [ ! -e "$web/vcp.wasm" ] || ! command -v chromium >/dev/null; then
+    echo "The target web was not built, or there is no Chromium: skipped"
+    exit 77
+fi
+here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
+rm -rf "$folder"
+mkdir -p "$folder"
+cd "$folder"
+for triangles in 10000 60000; do
+    "$make_scan" --triangles "$triangles" --colour -o scan.ply
+    "$vcp" build scan.ply -o scan.vcp --overwrite --progress none
+    "$vcp" publish scan.vcp -o "site$triangles" --viewer "$web" >/dev/null
+    mkdir "pictures$triangles"
+    "$node" "$here/page_test.mjs" "$vcp" "site$triangles" "pictures$triangles"
+done
