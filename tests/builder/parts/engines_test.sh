@@ -2,7 +2,7 @@
 # Builds in parts on the engines themselves: Slurm, Snakemake and OpenMPI, with parts that are cancelled and killed.
 # usage: engines_test.sh slurm|snakemake|snakemake_slurm|mpi VCP MAKE_SCAN SOURCE WORK
 # Slurm's daemons run here, as whoever runs the test, with files and a key of their own, and end with the test.
-# Ends with 77 (skipped) where an engine is not installed.
+# Ends with 77 (skipped) where an engine is not installed, or does not start on this machine.
 set -euo pipefail
 engine=$1 vcp=$2 make_scan=$3 scripts=$4/builder/cluster work=$5
 case $engine in
@@ -40,16 +40,18 @@ fail() {
     tail -n 20 cluster/*.log "$work"/*/*.parts/logs/* 2>/dev/null || true
     exit 1
 }
-# eventually SECONDS COMMAND...: waits until the command succeeds.
-eventually() {
+# within SECONDS COMMAND...: waits until the command succeeds, but no longer.
+within() {
     local seconds=$1
     shift
     for _ in $(seq $((seconds * 10))); do
         if "$@"; then return 0; fi
         sleep 0.1
     done
-    fail "after $seconds seconds, still not: $*"
+    return 1
 }
+eventually() { within "$@" || fail "after $1 seconds, still not: ${*:2}"; }
+comesUp() { within "$@" || { tail -n 20 cluster/*.log cluster/*.out; echo "skipped: no Slurm here: ${*:2}"; exit 77; }; }
 
 # daemon NAME COMMAND...: runs until the test ends, however that ends.
 daemon() {
@@ -104,10 +106,10 @@ CONF
     export SLURM_CONF=$work/cluster/slurm.conf
     daemon munged munged --foreground --force --key-file="$sockets/key" --socket="$sockets/munge" \
         --pid-file="$sockets/pid" --log-file="$work/cluster/munged.log" --seed-file="$sockets/seed"
-    eventually 20 test -S "$sockets/munge"
+    comesUp 20 test -S "$sockets/munge"
     daemon slurmctld slurmctld -D -i
     daemon slurmd slurmd -D
-    eventually 30 nodeIsIdle
+    comesUp 60 nodeIsIdle
 }
 
 # The program as a cluster's machines see it: the first time, vertices 1 stops where it is, and pages 0 is killed.
@@ -232,6 +234,7 @@ testMpi() {
             '"$0" build-step "$1" "$OMPI_COMM_WORLD_RANK" --plan "$2" --threads 1 --progress none' \
             "$work/bin/vcp" "$1" "$plan" >said 2>&1
     }
+    HOME=$work mpirun "${root[@]}" --oversubscribe -n 2 true >said 2>&1 || { cat said; echo "skipped: no MPI here"; exit 77; }
     plans mpi
     runs deal 1 || fail "$(cat said)"
     runs vertices 3 &
