@@ -6,7 +6,7 @@ export class Browser {
     /// `profile`: a folder for what it writes, until it is closed.
     constructor(profile) {
         this.profile = profile;
-        this.process = spawn('chromium', ['--headless=new', '--no-sandbox', '--disable-gpu', '--remote-debugging-pipe',
+        this.process = spawn('chromium', ['--headless=new', '--no-sandbox', '--disable-gpu', '--disable-dev-shm-usage', '--remote-debugging-pipe',
             '--no-first-run', `--user-data-dir=${profile}`, 'about:blank'],
             { stdio: ['ignore', 'ignore', 'ignore', 'pipe', 'pipe'] });
         this.process.on('exit', code => { if (!this.closed) this.fail(new Error(`chromium ended with ${code}`)); });

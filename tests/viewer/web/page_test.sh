@@ -6,6 +6,11 @@ if [ ! -e "$web/vcp.wasm" ] || ! command -v chromium >/dev/null; then
     echo "The target web was not built, or there is no Chromium: skipped"
     exit 77
 fi
+if ! timeout 120 chromium --headless=new --no-sandbox --disable-gpu --disable-dev-shm-usage --dump-dom about:blank \
+    >/dev/null 2>&1; then
+    echo "Chromium does not start here: skipped"
+    exit 77
+fi
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 rm -rf "$folder"
 mkdir -p "$folder"
