@@ -6,8 +6,8 @@ export class Browser {
     /// `profile`: a folder for what it writes, until it is closed.
     constructor(profile) {
         this.profile = profile;
-        this.process = spawn('chromium', ['--headless=new', '--no-sandbox', '--disable-gpu', '--disable-dev-shm-usage', '--remote-debugging-pipe',
-            '--no-first-run', `--user-data-dir=${profile}`, 'about:blank'],
+        this.process = spawn('chromium', ['--headless=new', '--no-sandbox', '--disable-gpu', '--disable-dev-shm-usage',
+            '--remote-debugging-pipe', '--no-first-run', `--user-data-dir=${profile}`, 'about:blank'],
             { stdio: ['ignore', 'ignore', 'ignore', 'pipe', 'pipe'] });
         this.process.on('exit', code => { if (!this.closed) this.fail(new Error(`chromium ended with ${code}`)); });
         [, , , this.to, this.from] = this.process.stdio;
