@@ -1,10 +1,6 @@
 // What must hold for every header, directory and directory block behind right hashes, however hostile: they are
 // refused, or what they say can be relied on. Read in parts the directory is the same; the tree is one; each page
-// decodes or is refused.
-//
-// The input: a FileHeader, the number of entries that follow (16 bits), PageEntries, then the bytes of the pages from
-// the first page's place on. The rest of the file is zero. Hashes, the number of bytes and the commit record are made
-// here, so that what they guard is reached.
+// decodes or is refused. The input: hostile_file.h.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -13,12 +9,14 @@
 
 #include "octree/dataset_reader.h"
 #include "octree/header_check.h"
-#include "octree/io/content_hash.h"
 #include "octree/vcp_verify.h"
+#include "tests/fuzz/hostile_file.h"
 
 namespace {
 
 using namespace vcp;
+using fuzz::fileOf;
+using fuzz::MemoryFile;
 
 constexpr uint64_t kMostBytes = 1 << 18, kMostPageBytes = 1 << 17;
 
@@ -26,74 +24,6 @@ void require(bool holds, const char* what) {
     if (holds) return;
     std::fprintf(stderr, "broken: %s\n", what);
     std::abort();
-}
-
-class MemoryFile final : public ByteReader {
-public:
-    explicit MemoryFile(std::vector<std::byte> content) : bytes(std::move(content)) {}
-    Result<void> read(uint64_t offset, std::span<std::byte> out) const override {
-        require(offset <= bytes.size() && out.size() <= bytes.size() - offset, "reads stay within the file");
-        if (!out.empty()) std::memcpy(out.data(), &bytes[offset], out.size());
-        return {};
-    }
-    [[nodiscard]] uint64_t size() const override { return bytes.size(); }
-    [[nodiscard]] const std::string& name() const override { return name_; }
-
-    std::vector<std::byte> bytes;
-
-private:
-    std::string name_ = "fuzz.vcp";
-};
-
-template <class T>
-T take(std::span<const std::byte>& from) {
-    T value{};
-    const size_t size = std::min(sizeof value, from.size());
-    if (size > 0) std::memcpy(static_cast<void*>(&value), from.data(), size);
-    from = from.subspan(size);
-    return value;
-}
-
-/// A page's hash is that of the bytes where it says it lies.
-void hashPage(const std::vector<std::byte>& file, uint64_t offset, uint32_t stored, uint64_t& hash) {
-    if (stored > 0 && offset < file.size() && stored <= file.size() - offset)
-        hash = hashBytes(std::span(file).subspan(offset, stored));
-}
-
-/// The file that the input stands for.
-std::vector<std::byte> fileOf(std::span<const std::byte> input) {
-    auto header = take<FileHeader>(input);
-    std::vector<PageEntry> entries(std::min<size_t>(take<uint16_t>(input), input.size() / sizeof(PageEntry)));
-    for (PageEntry& entry : entries) entry = take<PageEntry>(input);
-    const uint64_t pages = blockOffset(blocksOf(entries.size()));
-    const uint64_t end =
-        (pages + input.size() + kPageAlignment - 1) / kPageAlignment * kPageAlignment + sizeof(CommitRecord);
-    std::vector<std::byte> file(end);
-    if (!input.empty()) std::memcpy(&file[pages], input.data(), input.size());
-    for (size_t i = 0; i < entries.size(); ++i) {
-        hashPage(file, entries[i].offset, entries[i].storedBytes, entries[i].hash);
-        if (entries[i].colourStoredBytes > 0)
-            hashPage(file, entries[i].colourOffset, entries[i].colourStoredBytes, entries[i].colourHash);
-        std::memcpy(&file[blockOffset(i / kEntriesPerBlock) + i % kEntriesPerBlock * sizeof(PageEntry)], &entries[i],
-                    sizeof(PageEntry));
-    }
-    for (uint64_t at = kDirectoryOffset; at < pages; at += kBlockBytes) {
-        const uint64_t hash = hashBytes(std::span(file).subspan(at, kBlockBytes - 8));
-        std::memcpy(&file[at + kBlockBytes - 8], &hash, sizeof hash);
-    }
-    header.fileBytes = file.size();
-    header.hash = 0;
-    std::memcpy(file.data(), &header, sizeof header);
-    header.hash = hashBytes(std::span(file).first(kDirectoryOffset));
-    std::memcpy(file.data(), &header, sizeof header);
-    CommitRecord commit;
-    commit.fileBytes = file.size();
-    commit.headerHash = header.hash;
-    const uint64_t directory = std::min(blocksOf(header.pages), blocksOf(entries.size())) * kBlockBytes;
-    commit.directoryHash = hashBytes(std::span(file).subspan(kDirectoryOffset, directory));
-    commit.hash = hashBytes(std::as_bytes(std::span(&commit, 1)).first(offsetof(CommitRecord, hash)));
-    std::memcpy(&file[file.size() - sizeof commit], &commit, sizeof commit);
-    return file;
 }
 
 void checkEntry(const Dataset& d, uint64_t page, uint64_t fileBytes) {

@@ -1,5 +1,6 @@
 // The viewer for browsers without a browser: its module opens, streams and draws a scan; wrong servers and hostile files
-// end in one line. Usage: node module_test.mjs WEB_FOLDER SCAN.vcp SEEDS [VIEW]...
+// end in one line. Usage: node module_test.mjs WEB_FOLDER SCAN.vcp HOSTILE [VIEW]...
+// HOSTILE: what hostile_files wrote.
 // VIEW.json: a camera; VIEW.pfm: the depth that the program sees from there, 320 x 200.
 import assert from 'node:assert/strict';
 import fs from 'node:fs';
@@ -7,7 +8,7 @@ import path from 'node:path';
 import { pathToFileURL } from 'node:url';
 import { compareDepth, readDepth } from './native_depth.mjs';
 
-const [web, scan, seeds, ...natives] = process.argv.slice(2);
+const [web, scan, hostile, ...natives] = process.argv.slice(2);
 const { Module } = await import(pathToFileURL(path.join(web, 'module.js')));
 const { Ranges, joined, parseContentRange } = await import(pathToFileURL(path.join(web, 'ranges.js')));
 const { Orbit, kFieldOfView } = await import(pathToFileURL(path.join(web, 'camera.js')));
@@ -187,25 +188,73 @@ await check('every bit of the first block flipped: refused in one line, or harml
     }
 });
 
-await check('the seeds of the reader of files', async () => {
-    let count = 0;
-    for (const name of fs.readdirSync(seeds)) {
-        const bytes = fs.readFileSync(path.join(seeds, name)), module = await Module.load(wasm);
-        module.begin(bytes.length, name, 8 << 20);
-        module.supply(0, bytes);
-        try {
-            assert.ok(module.open());
-            const orbit = new Orbit(), info = module.info();
-            orbit.fit(info.boundsMin, info.boundsMax, 1);
-            look(module, orbit, 32, 32);
-            for (let round = 0; round < 20; ++round) if (module.update().drawable) module.render();
-        } catch (error) {
-            assert.ok(!(error instanceof WebAssembly.RuntimeError), `${name}: ${error.message}`);
-        }
-        assert.ok(module.memoryBytes() < 256 << 20);
-        ++count;
+/// The files of hostile_files, each with the line that the program's reader says to it.
+function* hostileFiles() {
+    const bytes = fs.readFileSync(hostile);
+    for (let at = 0; at < bytes.length;) {
+        const [fileEnd, lineEnd] = [8 + bytes.readUInt32LE(at), 8 + bytes.readUInt32LE(at) + bytes.readUInt32LE(at + 4)];
+        yield { content: bytes.subarray(at + 8, at + fileEnd), line: bytes.toString('utf8', at + fileEnd, at + lineEnd) };
+        at += lineEnd;
     }
-    console.log(`   ${count} files`);
+}
+
+/// Opens what one may, looks at it from near and far, and points at it. Returns the line that says why not, or '', and
+/// whether anything was drawn.
+function useHostile(module, content) {
+    module.begin(content.length, 'fuzz.vcp', 8 << 20);
+    module.supply(0, content);
+    try {
+        assert.ok(module.open());
+    } catch (error) {
+        if (error instanceof WebAssembly.RuntimeError) throw error;
+        return { said: error.message, isDrawn: false };
+    }
+    const orbit = new Orbit(), info = module.info();
+    let isDrawn = false;
+    orbit.fit(info.boundsMin, info.boundsMax, 1);
+    for (const nearer of [1, 0.05]) {
+        orbit.zoom(nearer, 0, 0);
+        look(module, orbit, 32, 32);
+        for (let round = 0; round < 8; ++round) {
+            const update = module.update();
+            assert.ok(!update.problem?.includes('\n'));
+            if (update.drawable) {
+                module.render();
+                module.pick(16, 16);
+                isDrawn = true;
+            }
+            if (update.settled) break;
+        }
+    }
+    return { said: '', isDrawn };
+}
+
+await check('hostile files: the lines of the program, no trap, no growth', async () => {
+    let module = await Module.load(wasm), refused = 0, opened = 0, drawn = 0, traps = [], other = [], most = 0, i = 0;
+    for (const { content, line } of hostileFiles()) {
+        let said, isDrawn;
+        try {
+            ({ said, isDrawn } = useHostile(module, content));
+            drawn += isDrawn ? 1 : 0;
+        } catch (error) {
+            traps.push(`${i}: ${error.message}`);
+            module = await Module.load(wasm);
+        }
+        most = Math.max(most, module.memoryBytes());
+        if (said === '') ++opened;
+        else if (said !== undefined) {
+            ++refused;
+            assert.ok(!said.includes('\n') && said.length > 0);
+        }
+        // The processor draws fewer files than the reader reads.
+        if (line !== '' && said !== undefined && said !== line) other.push(`${i}: ${said} instead of ${line}`);
+        ++i;
+    }
+    console.log(`   ${i} files: ${opened} opened, ${drawn} drawn, ${refused} refused; at most ${most} bytes of memory`);
+    assert.ok(drawn > 100 && refused > 100);
+    assert.deepEqual(traps, []);
+    assert.deepEqual(other, []);
+    assert.ok(most < 64 << 20);
 });
 
 console.log(`${checks} checks passed`);

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# The viewer for browsers against the program: web_test.sh NODE WEB_FOLDER VCP MAKE_SCAN FOLDER
+# The viewer for browsers against the program: web_test.sh NODE WEB_FOLDER VCP MAKE_SCAN HOSTILE_FILES FOLDER
 set -euo pipefail
-node=$1 web=$2 vcp=$3 make_scan=$4 folder=$5
+node=$1 web=$2 vcp=$3 make_scan=$4 hostile_files=$5 folder=$6
 if [ ! -e "$web/vcp.wasm" ]; then
     echo "The target web was not built: skipped"
     exit 77
@@ -18,4 +18,7 @@ echo '{ "position": [0.8, 1.9, 1.6], "target": [0, 1.1, 0], "fov_degrees": 34 }'
 for view in whole close; do
     "$vcp" render scan.vcp --device host --camera $view.json --size 320x200 --depth $view.pfm -o $view.png --overwrite --progress none
 done
-"$node" "$here/module_test.mjs" "$folder" scan.vcp "$here/../../fuzz/seeds/fuzz_file" whole close
+"$make_scan" --triangles 10000 --colour -o small.ply
+"$vcp" build small.ply -o small.vcp --overwrite --progress none
+"$hostile_files" hostile.bin 1000 "$here"/../../fuzz/seeds/fuzz_file/* small.vcp
+"$node" "$here/module_test.mjs" "$folder" scan.vcp hostile.bin whole close
