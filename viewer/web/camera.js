@@ -3,30 +3,41 @@
 const kLeastPitch = -1.55, kMostPitch = 1.55;
 export const kFieldOfView = 0.6; // radians, from the lower to the upper edge
 
+const kFitted = 0.96; // of the picture's half sides, for the whole box
+
+const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 const add = (a, b, s = 1) => a.map((x, i) => x + s * b[i]);
 export const length = a => Math.hypot(...a);
 export const difference = (a, b) => add(a, b, -1);
 
 export class Orbit {
     constructor() {
+        this.up = 'y'; // the axis of the mesh that points up, or 'z'
         this.target = [0, 0, 0];
         this.distance = 1;
         this.yaw = 0.6;
         this.pitch = 0.35;
     }
 
-    /// Looks at the whole box from the direction that it has.
+    /// Looks at the whole box from the direction that it has: each corner is within `kFitted` of the picture.
     fit(boundsMin, boundsMax, aspect) {
         this.target = boundsMin.map((x, i) => (x + boundsMax[i]) / 2);
-        const radius = length(difference(boundsMax, boundsMin)) / 2 || 1;
-        this.radius = radius;
-        this.distance = radius / Math.sin(kFieldOfView / 2) / Math.min(1, aspect) * 0.8;
+        this.radius = length(difference(boundsMax, boundsMin)) / 2 || 1;
+        const { right, up, forward } = this.axes(), half = Math.tan(kFieldOfView / 2) * kFitted;
+        this.distance = this.radius * 1e-3;
+        for (let i = 0; i < 8; ++i) {
+            const corner = boundsMin.map((low, axis) => (i >> axis & 1 ? boundsMax[axis] : low) - this.target[axis]);
+            const away = Math.max(Math.abs(dot(corner, right)) / aspect, Math.abs(dot(corner, up))) / half;
+            this.distance = Math.max(this.distance, away - dot(corner, forward));
+        }
     }
 
     /// Unit axes: right, up and forward.
     axes() {
         const [cy, sy, cp, sp] = [Math.cos(this.yaw), Math.sin(this.yaw), Math.cos(this.pitch), Math.sin(this.pitch)];
-        return { right: [cy, 0, -sy], up: [-sy * sp, cp, -cy * sp], forward: [-sy * cp, -sp, -cy * cp] };
+        const axes = { right: [cy, 0, -sy], up: [-sy * sp, cp, -cy * sp], forward: [-sy * cp, -sp, -cy * cp] };
+        if (this.up === 'z') for (const name in axes) axes[name] = [axes[name][0], -axes[name][2], axes[name][1]];
+        return axes;
     }
     eye() {
         return add(this.target, this.axes().forward, -this.distance);
@@ -68,7 +79,6 @@ export class Orbit {
     /// Where a world point is seen in a picture, in pixels; null behind the eye.
     project(point, width, height) {
         const { right, up, forward } = this.axes(), to = difference(point, this.eye());
-        const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
         const depth = dot(to, forward);
         if (!(depth > 0)) return null;
         const scale = height / 2 / Math.tan(kFieldOfView / 2) / depth;

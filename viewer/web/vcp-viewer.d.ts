@@ -27,7 +27,10 @@ export interface Annotation {
 
 export type ShadingMode = 'lit' | 'clay' | 'unlit' | 'normals' | 'level' | 'error';
 
-/** `<vcp-viewer src annotations mode theme budget light shadows occlusion section>`; events: load, progress, settled, pick, error. */
+/**
+ * `<vcp-viewer src annotations mode theme budget light shadows occlusion section up>`;
+ * events: load, progress, settled, pick, error.
+ */
 export class VcpViewer extends HTMLElement {
     src: string | null;
     mode: ShadingMode;

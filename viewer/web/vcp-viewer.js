@@ -28,7 +28,7 @@ function measureText(x, error) {
 }
 
 export class VcpViewer extends HTMLElement {
-    static observedAttributes = ['src', 'mode', 'annotations', 'theme', 'light', 'shadows', 'occlusion', 'section'];
+    static observedAttributes = ['src', 'mode', 'annotations', 'theme', 'light', 'shadows', 'occlusion', 'section', 'up'];
 
     constructor() {
         super();
@@ -88,6 +88,7 @@ export class VcpViewer extends HTMLElement {
         if (name === 'annotations') this.readNotes();
         if (name === 'theme') this.chooseTheme();
         if (name === 'light') this.light.fromText(now ?? '');
+        if (name === 'up') return this.fit();
         this.showControls();
         if (['light', 'section'].includes(name)) this.moved();
         else this.look(false);
@@ -201,6 +202,7 @@ export class VcpViewer extends HTMLElement {
 
     fit() {
         if (!this.info) return;
+        this.orbit.up = this.getAttribute('up') === 'z' ? 'z' : 'y';
         this.orbit.fit(this.info.boundsMin, this.info.boundsMax, this.clientWidth / Math.max(this.clientHeight, 1));
         this.moved();
     }

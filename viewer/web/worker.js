@@ -6,6 +6,7 @@ const kLead = 64 << 10;      // bytes of the first request: header, directory an
 const kGap = 32 << 10;       // pages so near each other are fetched in one request
 const kMostBytes = 256 << 10; // of one request
 const kAtOnce = 4;           // requests
+const kFrameMs = 16; // between frames that nothing else asks for
 const kSamples = 8;          // of a pixel, where a view is at rest
 
 let module, ranges, view = null, awake = null, fetching = 0, failed = null, drawn = null, hidden = false;
@@ -107,7 +108,11 @@ async function run() {
             if (samples > 0 && (samples & (samples - 1)) === 0) draw(update, samples);
         } else if (view === now) {
             if (update.settled && !now.moving) post('settled', { number: now.number, update });
-            await new Promise(done => { awake = done; });
+            await new Promise(done => {
+                awake = done;
+                // The policy may need more frames before it lets pages go that were seen a moment ago.
+                if (!update.settled && fetching === 0) setTimeout(done, kFrameMs);
+            });
         }
         // Messages of the page come in between.
         await new Promise(done => setTimeout(done));

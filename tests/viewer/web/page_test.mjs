@@ -1,7 +1,7 @@
 // A published page in headless Chromium: page_test.mjs VCP FOLDER PICTURES
 // FOLDER: as `vcp publish` makes it. PICTURES: folder for what is seen.
 import assert from 'node:assert/strict';
-import { execFileSync } from 'node:child_process';
+import { execFileSync, spawn } from 'node:child_process';
 import fs from 'node:fs';
 import http from 'node:http';
 import path from 'node:path';
@@ -54,7 +54,7 @@ const browser = new Browser(path.join(pictures, 'profile'));
 process.on('exit', () => browser.process.kill('SIGKILL'));
 
 /// Opens the page and waits until it has settled or shows a problem.
-async function open(width, height, { fault = '', link = '', touch = false } = {}) {
+async function open(width, height, { fault = '', link = '', touch = false, site = address } = {}) {
     wrong = fault;
     asked = { scan: 0, bytes: 0, missing: [], methods: new Set() };
     const page = await browser.page(width, height, touch);
@@ -67,7 +67,7 @@ async function open(width, height, { fault = '', link = '', touch = false } = {}
             window.viewer = document.querySelector('vcp-viewer');
             window.part = name => viewer.shadowRoot.querySelector(name);
         });` });
-    await page.call('Page.navigate', { url: address + link });
+    await page.call('Page.navigate', { url: site + link });
     await settle(page);
     return page;
 }
@@ -288,6 +288,53 @@ async function crosses() {
     await closeGood(page);
 }
 
+/// Views at random with less memory than the scan takes: each settles, the budget holds, and memory does not grow.
+async function wanders() {
+    const page = await open(320, 200), budget = 1 << 20;
+    await change(page, `viewer.setAttribute('budget', ${budget / 2 ** 20}); viewer.src = 'scan.vcp?anew'; state.most = 0;
+        addEventListener('progress', event => {
+            state.most = Math.max(state.most, event.detail.residentBytes);
+            state.relaxed ||= event.detail.relaxed;
+        })`);
+    let seed = 1, memory = [];
+    const random = (low, high) => {
+        seed = seed * 16807 % 2147483647;
+        return low + seed / 2147483647 * (high - low);
+    };
+    for (let i = 0; i < 40; ++i) {
+        // A view that is left before its pages have come must not keep the next one from settling.
+        for (let moves = random(0, 4); moves > 0; --moves)
+            await page.evaluate(`viewer.orbit.turn(${random(-150, 150)}, ${random(-100, 100)}, 200);
+                viewer.orbit.zoom(${Math.exp(random(-1.5, 1.5))}, ${random(-0.5, 0.5)}, ${random(-0.5, 0.5)}); viewer.moved()`);
+        await change(page, i % 8 === 7 ? 'viewer.fit()' : 'viewer.moved()');
+        memory.push(await page.evaluate('state.last.memoryBytes'));
+    }
+    const most = await page.evaluate('state.most');
+    console.log(`40 views: at most ${most} bytes of ${budget}; ${memory[19]} bytes of memory after 20, ${memory[39]} after 40`);
+    assert.ok(most > 0 && most <= budget && await page.evaluate('state.relaxed'));
+    assert.ok(memory[39] <= memory[19] * 1.25);
+    await closeGood(page);
+}
+
+/// The folder as `vcp serve` serves it; the axis that points up; a box is shown as a whole whatever the page's form.
+async function serves() {
+    const server = spawn(vcp, ['serve', folder, '--port', '0', '--json'], { stdio: ['ignore', 'pipe', 'inherit'] });
+    const said = JSON.parse(await new Promise(done => server.stdout.once('data', done)));
+    const page = await open(200, 420, { site: said.address });
+    const { boundsMin: low, boundsMax: high } = await page.evaluate('viewer.info');
+    for (const up of ['y', 'z']) {
+        await change(page, `viewer.setAttribute('up', '${up}')`);
+        const corners = [...Array(8).keys()].map(i => low.map((x, axis) => (i >> axis & 1 ? high[axis] : x)));
+        const seen = await page.evaluate(`${JSON.stringify(corners)}.map(x => viewer.orbit.project(x, 200, 420))`);
+        for (const { x, y } of seen) assert.ok(x >= 0 && x <= 200 && y >= 0 && y <= 420, `${up}: ${x}, ${y}`);
+        assert.ok(Math.max(...seen.map(p => p.x)) - Math.min(...seen.map(p => p.x)) > 120, 'and fills the page');
+        const [foot, top] = await page.evaluate(`[[0, 0, 0], ${up === 'y' ? '[0, 1, 0]' : '[0, 0, 1]'}].map(x => viewer.orbit.project(x, 200, 420))`);
+        assert.ok(Math.abs(foot.x - top.x) < 1e-6 + 0.05 * Math.abs(foot.y - top.y) && top.y < foot.y, `${up} points up`);
+    }
+    await page.close();
+    server.kill('SIGINT');
+}
+
 await hears();
 await looks(1600, 1000, false);
 await looks(390, 844, true);
@@ -299,6 +346,8 @@ if (scan.length > kLead) {
     await annotates();
     await returns();
     await crosses();
+    await wanders();
+    await serves();
 }
 await browser.close();
 console.log('page_test: all checks passed');
