@@ -12,7 +12,34 @@
 
 namespace vcp {
 
+uint64_t LevelSink::Batch::pageAround(const LatticeTriangle& t) const {
+    const FinestPages& pages = sink_.pages_;
+    const PageGrid grid = pages.gridOf(pages.base());
+    const uint32_t log2Steps = PageGrid::kLog2LatticePerCell + pages.deepest() - pages.base();
+    // Bounds are widened by a little more than forPagesNear does.
+    const auto margin = int64_t(std::ldexp(sink_.marginCells_, int(log2Steps))) + 4;
+    const auto low = (glm::i64vec3(glm::min(t.corner[0], glm::min(t.corner[1], t.corner[2]))) - margin) >>
+                     int64_t(log2Steps + grid.log2Cells);
+    const auto high = (glm::i64vec3(glm::max(t.corner[0], glm::max(t.corner[1], t.corner[2]))) + margin) >>
+                      int64_t(log2Steps + grid.log2Cells);
+    const bool isOne = low == high && glm::all(glm::greaterThanEqual(low, glm::i64vec3(0))) &&
+                       glm::all(glm::lessThanEqual(low, glm::i64vec3(grid.lastPage())));
+    return isOne ? mortonEncode(glm::u32vec3(low)) : kNoPage;
+}
+
 const std::vector<size_t>& LevelSink::Batch::binsOf(const LatticeTriangle& t) {
+    const uint64_t page = pageAround(t);
+    if (page != kNoPage && page == page_) return touched_;
+    page_ = kNoPage;
+    if (page != kNoPage) {
+        const FinestPages& pages = sink_.pages_;
+        const size_t bin = sink_.partition_.binOf(pages.firstCode(pages.base(), page));
+        if (sink_.partition_.binOf(pages.firstCode(pages.base(), page + 1) - 1) == bin) {
+            page_ = page;
+            touched_.assign(1, bin);
+            return touched_;
+        }
+    }
     // A triangle seldom spans more than two bins, so the list of those seen is short.
     touched_.clear();
     sink_.pages_.forPagesNear(t.corner, sink_.marginCells_, [&](uint32_t level, uint64_t page) {

@@ -50,9 +50,15 @@ public:
         Result<void> flush() { return batch_.flush(); }
 
     private:
+        /// Returns the page of the base level that the triangle lies in, and its margin, too; or kNoPage.
+        [[nodiscard]] uint64_t pageAround(const LatticeTriangle& triangle) const;
+
+        static constexpr uint64_t kNoPage = ~uint64_t{0};
         LevelSink& sink_;
         BinBatch<LatticeTriangle> batch_;
         std::vector<size_t> touched_;
+        /// The last page that lay in one bin with all that is below it, which is the one in touched_.
+        uint64_t page_ = kNoPage;
     };
 
 private:

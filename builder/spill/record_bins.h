@@ -146,26 +146,31 @@ public:
     explicit BinBatch(RecordBins<Record>& bins) : bins_(bins) {}
 
     Result<void> add(size_t bin, const Record& record) {
-        held_.emplace_back(bin, record);
-        return held_.size() < kHeldRecords ? Result<void>() : flush();
+        order_.push_back(uint64_t{bin} << kLog2HeldRecords | held_.size());
+        held_.push_back(record);
+        return held_.size() < size_t{1} << kLog2HeldRecords ? Result<void>() : flush();
     }
     Result<void> flush() {
-        std::stable_sort(held_.begin(), held_.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
-        for (size_t i = 0; i < held_.size();) {
-            const size_t bin = held_[i].first;
+        // The places within the batch are sorted with the bins, so a bin's records keep their order.
+        std::sort(order_.begin(), order_.end());
+        for (size_t i = 0; i < order_.size();) {
+            const uint64_t bin = order_[i] >> kLog2HeldRecords;
             run_.clear();
-            for (; i < held_.size() && held_[i].first == bin; ++i) run_.push_back(held_[i].second);
-            VCP_TRY(bins_.append(bin, run_));
+            for (; i < order_.size() && order_[i] >> kLog2HeldRecords == bin; ++i)
+                run_.push_back(held_[order_[i] % (1u << kLog2HeldRecords)]);
+            VCP_TRY(bins_.append(size_t(bin), run_));
         }
+        order_.clear();
         held_.clear();
         return {};
     }
 
 private:
-    static constexpr size_t kHeldRecords = 4096;
+    static constexpr unsigned kLog2HeldRecords = 12;
 
     RecordBins<Record>& bins_;
-    std::vector<std::pair<size_t, Record>> held_;
+    std::vector<uint64_t> order_;  ///< of each record its bin, then its place in held_
+    std::vector<Record> held_;
     std::vector<Record> run_;
 };
 

@@ -229,6 +229,52 @@ TEST(LevelStep, VerticesOnPageWalls) {
     expectPartitionsAgree(mesh, 1);
 }
 
+TEST(LevelSink, BinsOfATriangleAreThoseOfThePagesNearIt) {
+    const PageGrid base{kLog2Cells, 2};
+    size_t several = 0;
+    for (uint64_t seed = 0; seed < 60; ++seed) {
+        std::mt19937_64 random(seed);
+        std::vector<std::vector<uint64_t>> parted(seed % 3);
+        for (size_t depth = 0; depth < parted.size(); ++depth)
+            for (int i = 0; i < 6; ++i) parted[depth].push_back(random() % (uint64_t{64} << 3 * depth));
+        const FinestPages pages(base, parted);
+        const PagePartition partition = randomPartition(pages.deepest(), seed);
+        const TestFolder folder("vcp_level_sink_test");
+        TempSpace space(folder.path() / "temp", uint64_t{1} << 20);
+        RecordBins<LatticeTriangle> bins(space, "level", partition.bins(), 1 << 20);
+        const double margin = seed % 5 == 0 ? 0.5 : kStepMarginCells / double(1 + seed % 7);
+        LevelSink sink(pages, partition, bins, margin);
+        LevelSink::Batch batch(sink);
+        const int edge = 1 << (kLog2Cells + PageGrid::kLog2LatticePerCell + pages.deepest());
+        LatticeTriangle t{};
+        for (int k = 0; k < 2000; ++k) {
+            // Some beside the one before, some on walls of pages, a few long.
+            const bool isBeside = random() % 4 != 0;
+            const int reach = random() % 50 == 0 ? edge / 2 : edge >> (5 + random() % 6);
+            glm::i32vec3 at = t.corner[0];
+            for (int i = 0; i < 3 && !isBeside; ++i) {
+                at[i] = int(random() % uint64_t(edge + 1));
+                if (random() % 4 == 0) at[i] = at[i] / (edge / 16) * (edge / 16);
+            }
+            for (glm::i32vec3& corner : t.corner)
+                for (int i = 0; i < 3; ++i)
+                    corner[i] = std::clamp(at[i] + int(random() % uint64_t(2 * reach + 1)) - reach, 0, edge);
+            std::vector<size_t> want;
+            pages.forPagesNear(t.corner, margin, [&](uint32_t level, uint64_t page) {
+                want.push_back(partition.binOf(pages.firstCode(level, page)));
+            });
+            std::sort(want.begin(), want.end());
+            want.erase(std::unique(want.begin(), want.end()), want.end());
+            std::vector<size_t> have = batch.binsOf(t);
+            std::sort(have.begin(), have.end());
+            ASSERT_EQ(have, want) << "seed " << seed << ", triangle " << k;
+            several += want.size() > 1 ? 1 : 0;
+        }
+    }
+    EXPECT_GT(several, 10000u);
+    EXPECT_LT(several, 110000u);
+}
+
 TEST(VertexStep, KeepsPositionsAndBringsNormals) {
     const Soup soup = test::soupOf(test::torusMesh({31, 33, 30}, 20, 6, 60, 30));
     LatticeMesh want = meshOf(soup, true);

@@ -5,6 +5,7 @@
 #include <fstream>
 #include <random>
 #include <thread>
+#include <tuple>
 
 #include <gtest/gtest.h>
 
@@ -140,27 +141,56 @@ TEST_F(BuildParts, MissingPartsAreNamed) {
 
 TEST_F(BuildParts, CutOffAndLostFilesNameTheirPart) {
     planned(3);
-    for (const char* stage : {"deal", "vertices", "pages"})
+    const std::tuple<const char*, const char*, const char*> readers[] = {
+        {"deal", "deal 0", "vertices"}, {"vertices", "vertices 1", "pages"}, {"pages", "pages 1", "merge"}};
+    for (const auto& [stage, part, reader] : readers) {
         ASSERT_NO_FATAL_FAILURE(runAll(stage, std::string(stage) == "deal" ? 1 : 3));
-    size_t tried = 0;
-    for (const auto& each : fs::directory_iterator(plan() / "pages-1")) {
-        const fs::path file = each.path();
-        const auto size = fs::file_size(file);
-        if (size == 0) continue;
-        const std::string content = bytesOf(file);
-        // A journal's line is whole without its end.
-        const bool isJournal = file.filename() == "journal";
-        fs::resize_file(file, isJournal ? size / 2 : size - 1);
-        expectRefused(run("merge", 0), ErrorCode::InvalidInput, "pages 1");
-        fs::remove(file);
-        expectRefused(run("merge", 0), isJournal ? ErrorCode::Usage : ErrorCode::InvalidInput, "pages 1");
-        std::ofstream(file, std::ios::binary) << content;
-        ++tried;
+        const fs::path partFolder = plan() / (stage + std::string(1, '-') + part[std::string(part).size() - 1]);
+        size_t tried = 0;
+        for (const auto& each : fs::directory_iterator(partFolder)) {
+            const fs::path file = each.path();
+            const auto size = fs::file_size(file);
+            if (size == 0) continue;
+            const std::string content = bytesOf(file);
+            // A journal's line is whole without its end.
+            const bool isJournal = file.filename() == "journal";
+            fs::resize_file(file, isJournal ? size / 2 : size - 1);
+            expectRefused(run(reader, 0), ErrorCode::InvalidInput, part);
+            fs::remove(file);
+            expectRefused(run(reader, 0), isJournal ? ErrorCode::Usage : ErrorCode::InvalidInput, part);
+            std::ofstream(file, std::ios::binary) << content;
+            ++tried;
+        }
+        EXPECT_GE(tried, std::string(stage) == "deal" ? 2u : 3u) << stage;
+        fs::remove_all(partFolder);
+        expectRefused(run(reader, 0), ErrorCode::Usage, part);
+        ASSERT_TRUE(run(stage, unsigned(part[std::string(part).size() - 1] - '0')).ok());
     }
-    EXPECT_GE(tried, 3u);
-    fs::remove_all(plan() / "pages-1");
-    expectRefused(run("merge", 0), ErrorCode::Usage, "pages 1");
-    ASSERT_TRUE(run("pages", 1).ok());
+    ASSERT_TRUE(run("merge", 0).ok());
+    EXPECT_EQ(bytesOf(output()), whole_);
+}
+
+TEST_F(BuildParts, WrongBytesNameTheirPart) {
+    planned(2);
+    const std::tuple<const char*, const char*, const char*> readers[] = {
+        {"deal", "deal 0", "vertices"}, {"vertices", "vertices 0", "pages"}, {"pages", "pages 1", "merge"}};
+    for (const auto& [stage, part, reader] : readers) {
+        ASSERT_NO_FATAL_FAILURE(runAll(stage, std::string(stage) == "deal" ? 1 : 2));
+        const fs::path partFolder = plan() / (stage + std::string(1, '-') + part[std::string(part).size() - 1]);
+        for (const auto& each : fs::directory_iterator(partFolder)) {
+            const std::string content = bytesOf(each.path());
+            if (content.empty()) continue;
+            std::string wrong = content;
+            wrong[content.size() / 2] = char(wrong[content.size() / 2] ^ 16);
+            std::ofstream(each.path(), std::ios::binary) << wrong;
+            Result<PartReport> refused;
+            for (unsigned i = 0; i < (std::string(reader) == "merge" ? 1u : 2u); ++i)
+                if (auto done = run(reader, i); !done) refused = done;
+            expectRefused(refused, ErrorCode::InvalidInput, part);
+            std::ofstream(each.path(), std::ios::binary) << content;
+            for (unsigned i = 0; i < 2; ++i) fs::remove_all(plan() / (reader + std::string(i == 0 ? "-0" : "-1")));
+        }
+    }
     ASSERT_TRUE(run("merge", 0).ok());
     EXPECT_EQ(bytesOf(output()), whole_);
 }

@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # A build in parts through the command line and the scripts for clusters: the bytes of `vcp build`.
-# usage: cluster_test.sh VCP MAKE_SCAN SOURCE WORK
+# usage: cluster_test.sh VCP MAKE_SCAN FAILING_CALLS_LIBRARY SOURCE WORK
 set -euo pipefail
-vcp=$1 make_scan=$2 scripts=$3/builder/cluster work=$4
+vcp=$1 make_scan=$2 library=$3 scripts=$4/builder/cluster work=$5
 rm -rf "$work"
 mkdir -p "$work/bin" "$work/a folder"
 cd "$work"
@@ -58,6 +58,35 @@ if [ "$(id -u)" != 0 ]; then
     refused "ermission" "$vcp" build-step vertices 1 --plan killed.vcp.parts --progress none
     chmod u+w killed.vcp.parts
 fi
+
+# A full disk, from each call that writes on: one line, and the folder as it was.
+"$make_scan" --triangles 10000 -o small.ply
+"$vcp" build small.ply -o small_whole.vcp --progress none >said
+"$vcp" build-plan small.ply -o full.vcp --parts 2 >said
+calls=0
+for step in "deal 0" "vertices 1" "vertices 0" "pages 1" "pages 0" "merge 0"; do
+    for ((n = 1; ; ++n)); do
+        rm -f failed
+        before=$(ls full.vcp.parts) status=0
+        # shellcheck disable=SC2086
+        LD_PRELOAD=$library FAIL_AT=$n FAIL_ERRNO=28 FAIL_ON=1 FAIL_MARK=failed \
+            "$vcp" build-step $step --plan full.vcp.parts --threads 1 --progress none >out 2>said || status=$?
+        [ -e failed ] || break
+        calls=$((calls + 1))
+        [ $status = 1 ] || fail "$step, call $n: exit status $status: $(cat said)"
+        [ "$(wc -l <said)" = 1 ] || fail "$step, call $n: not one line: $(cat said)"
+        grep "No space left on device" said >found || fail "$step, call $n does not say why: $(cat said)"
+        # A whole part may only not be durable yet.
+        if grep "make the folder durable" said >found; then
+            rm -rf "full.vcp.parts/${step/ /-}" full.vcp
+        fi
+        [ "$before" = "$(ls full.vcp.parts)" ] || fail "$step, call $n left $(ls full.vcp.parts): $(cat said)"
+        [ ! -e full.vcp ] && [ ! -e full.vcp.partial ] || fail "$step, call $n left a file: $(cat said)"
+    done
+    [ $status = 0 ] || fail "$step: nothing failed, but: $(cat said)"
+done
+[ $calls -ge 60 ] || fail "only $calls calls were counted"
+cmp small_whole.vcp full.vcp || fail "after a full disk: other bytes"
 
 # The script for Slurm, with an sbatch that runs the parts at once, the last one first.
 cat >bin/sbatch <<'SBATCH'
