@@ -28,14 +28,14 @@ uint64_t LevelSink::Batch::pageAround(const LatticeTriangle& t) const {
 }
 
 const std::vector<size_t>& LevelSink::Batch::binsOf(const LatticeTriangle& t) {
-    const uint64_t page = pageAround(t);
-    if (page != kNoPage && page == page_) return touched_;
+    const uint64_t around = pageAround(t);
+    if (around != kNoPage && around == page_) return touched_;
     page_ = kNoPage;
-    if (page != kNoPage) {
+    if (around != kNoPage) {
         const FinestPages& pages = sink_.pages_;
-        const size_t bin = sink_.partition_.binOf(pages.firstCode(pages.base(), page));
-        if (sink_.partition_.binOf(pages.firstCode(pages.base(), page + 1) - 1) == bin) {
-            page_ = page;
+        const size_t bin = sink_.partition_.binOf(pages.firstCode(pages.base(), around));
+        if (sink_.partition_.binOf(pages.firstCode(pages.base(), around + 1) - 1) == bin) {
+            page_ = around;
             touched_.assign(1, bin);
             return touched_;
         }

@@ -69,6 +69,14 @@ Result<void> checkStep(const PartStep& step, const PartPlan& plan) {
                  step.folder);
 }
 
+/// Checks a part that is done: another memory, or another machine's, may have dealt into other bins since.
+Result<void> checkDone(const PartStep& step, const PartPlan& plan) {
+    if (step.stage == "deal" || !isDone({step.folder, "deal", 0})) return {};
+    VCP_TRY_ASSIGN(const auto context, openDealt(step.folder, plan));
+    const auto opened = context.open(step.stage, step.number);
+    return opened ? Result<void>() : opened.error();
+}
+
 Result<PartReport> run(const PartStep& step, const PartPlan& plan, const std::function<bool(double)>& progress) {
     PartReport report;
     const PartName name{step.folder, step.stage, step.number};
@@ -134,9 +142,13 @@ Result<PartReport> runPart(const PartStep& given) {
     if (!step.folder.has_filename()) step.folder = step.folder.parent_path();
     VCP_TRY_ASSIGN(auto plan, readPlan(step.folder));
     VCP_TRY(checkStep(step, plan));
-    if (isDone({step.folder, step.stage, step.number})) return PartReport{.wasDone = true};
     if (step.threads > 0) plan.options.threads = step.threads;
     if (step.memoryBytes > 0) plan.options.memoryBytes = step.memoryBytes;
+    if (isDone({step.folder, step.stage, step.number})) {
+        const auto checked = caught([&] { return checkDone(step, plan); }, step.folder.string());
+        if (!checked) return named(checked.error(), step.folder);
+        return PartReport{.wasDone = true};
+    }
     plan.options.progress = step.progress;
     ProgressMeter meter(step.progress);
     const std::function<bool(double)> progress = [&](double part) {

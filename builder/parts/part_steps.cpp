@@ -6,6 +6,7 @@
 #include <utility>
 
 #include <fmt/format.h>
+#include <xxhash.h>
 
 #include "builder/dataset_assembly.h"
 #include "builder/level/vertex_step.h"
@@ -84,7 +85,7 @@ public:
         FinestBins all;
         const size_t bins = context.levels.finest.bins();
         for (unsigned k = 0; k < context.plan.parts; ++k) {
-            VCP_TRY_ASSIGN(auto part, openPart(context.part("vertices", k)));
+            VCP_TRY_ASSIGN(auto part, context.open("vertices", k));
             all.parts_.push_back(std::move(part));
             const DonePart& done = all.parts_.back();
             const auto wanted = done.fields.at("for").get<std::vector<unsigned>>();
@@ -168,6 +169,17 @@ Result<void> buildAbove(const PartContext& context, unsigned part, TempSpace& sp
 
 }  // namespace
 
+Result<DonePart> PartContext::open(const std::string& stage, unsigned number) const {
+    const PartName name = part(stage, number);
+    VCP_TRY_ASSIGN(auto done, openPart(name));
+    if (done.fields.value("bins", "") == bins) return done;
+    return Error{.code = ErrorCode::Usage,
+                 .message = fmt::format("was made before \"deal 0\" was run again, with other bins; delete it and run "
+                                        "the step \"{}\" of this plan again",
+                                        name.step()),
+                 .file = name.folder().string()};
+}
+
 uint64_t PartContext::firstCode(unsigned part) const {
     const size_t bin = firstBins[part];
     const std::vector<uint64_t>& first = levels.finest.first();
@@ -182,13 +194,23 @@ LevelSettings PartContext::settingsOf(int level, bool isFinest, TempSpace& space
     return settings;
 }
 
-Result<PartContext> openContext(const std::filesystem::path& folder, const PartPlan& plan) {
+Result<PartContext> openDealt(const std::filesystem::path& folder, const PartPlan& plan) {
     PartContext context;
     context.folder = folder;
     context.plan = plan;
     VCP_TRY_ASSIGN(context.dealt, openPart(context.part("deal", 0)));
     const std::filesystem::path journal = context.part("deal", 0).folder() / kJournalName;
     VCP_TRY_ASSIGN(context.recorded, recordedFrom(context.dealt.fields, journal));
+    context.firstBins = context.dealt.fields.at("first bins").get<std::vector<size_t>>();
+    if (context.firstBins.size() != size_t{plan.parts} + 1) return damagedTempFile(journal);
+    const Recorded& recorded = context.recorded;
+    const std::string chosen = json{recorded.levelsLess, recorded.parted, recorded.partition, context.firstBins}.dump();
+    context.bins = fmt::format("{:016x}", XXH3_64bits(chosen.data(), chosen.size()));
+    return context;
+}
+
+Result<PartContext> openContext(const std::filesystem::path& folder, const PartPlan& plan) {
+    VCP_TRY_ASSIGN(auto context, openDealt(folder, plan));
     const Recorded& recorded = context.recorded;
     VCP_TRY_ASSIGN(context.levels, planLevels(plan.options, recorded.measures, recorded.levelsLess));
     LevelPlan& levels = context.levels;
@@ -200,8 +222,6 @@ Result<PartContext> openContext(const std::filesystem::path& folder, const PartP
     VCP_TRY_ASSIGN(context.memory, planPages(context.memory, recorded.pages, levels.finest.bins()));
     levels.pageBytes = context.memory.pageBytes;
     context.hasColour = colourUseOf(plan.options, recorded.measures).any();
-    context.firstBins = context.dealt.fields.at("first bins").get<std::vector<size_t>>();
-    if (context.firstBins.size() != size_t{plan.parts} + 1) return damagedTempFile(journal);
     return context;
 }
 
@@ -229,7 +249,8 @@ Result<void> runVertices(const PartContext& context, unsigned number, NewPart& m
     VCP_TRY(record(triangles.raw(), "level", files));
     VCP_TRY(record(vertices.raw(), "normals", files));
     VCP_TRY(record(parts.raw(), "parts", files));
-    return made.finish({{"files", files}, {"for", partsWith(context, triangles.raw(), vertices.raw())}});
+    return made.finish(
+        {{"bins", context.bins}, {"files", files}, {"for", partsWith(context, triangles.raw(), vertices.raw())}});
 }
 
 Result<void> runPages(const PartContext& context, unsigned number, NewPart& made) {
@@ -261,7 +282,8 @@ Result<void> runPages(const PartContext& context, unsigned number, NewPart& made
     VCP_TRY_ASSIGN(const auto pageLengths, recordedSpools(pages));
     VCP_TRY_ASSIGN(const auto keptLengths, recordedSpools(kept));
     const PartCounts& counts = finest.counts();
-    return made.finish({{"pages", pageLengths},
+    return made.finish({{"bins", context.bins},
+                        {"pages", pageLengths},
                         {"kept", keptLengths},
                         {"mesh parts", {counts.parts, counts.closed, counts.openEdges}}});
 }
@@ -273,7 +295,7 @@ Result<BuildFigures> runMerge(const PartContext& context, NewPart& made) {
                           surfaces = makeSpools(space, levels.frame.levels, "surface");
     PartCounts counts;
     for (unsigned k = 0; k < context.plan.parts; ++k) {
-        VCP_TRY_ASSIGN(const auto part, openPart(context.part("pages", k)));
+        VCP_TRY_ASSIGN(const auto part, context.open("pages", k));
         VCP_TRY(gather(part, "pages", "", pages));
         VCP_TRY(gather(part, "kept", "kept", surfaces));
         const json& noted = part.fields.at("mesh parts");

@@ -195,6 +195,38 @@ TEST_F(BuildParts, WrongBytesNameTheirPart) {
     EXPECT_EQ(bytesOf(output()), whole_);
 }
 
+TEST_F(BuildParts, PartsOfOtherBinsAreRefused) {
+    planned(2);
+    ASSERT_NO_FATAL_FAILURE(runAll("deal", 1));
+    ASSERT_NO_FATAL_FAILURE(runAll("vertices", 2));
+    ASSERT_NO_FATAL_FAILURE(runAll("pages", 2));
+    // The same deal again, as after a loss: what was made from it stays good.
+    fs::remove_all(plan() / "deal-0");
+    ASSERT_TRUE(run("deal", 0).ok());
+    const auto again = run("pages", 1);
+    ASSERT_TRUE(again.ok()) << again.error().line();
+    EXPECT_TRUE(again->wasDone);
+    // Another memory may have other bins; here, another cell has.
+    BuildOptions coarser = options();
+    coarser.cell = 1;
+    coarser.temp = folder_ / "coarser";
+    fs::create_directory(coarser.temp);
+    const auto other = planParts(coarser, 2);
+    ASSERT_TRUE(other.ok()) << other.error().line();
+    ASSERT_TRUE(runPart({.folder = *other, .stage = "deal", .number = 0, .threads = 1}).ok());
+    fs::rename(plan() / "deal-0", folder_ / "deal-0");
+    fs::rename(*other / "deal-0", plan() / "deal-0");
+    expectRefused(run("merge", 0), ErrorCode::Usage, "pages 0");
+    expectRefused(run("pages", 1), ErrorCode::Usage, "pages 1");
+    fs::remove_all(plan() / "pages-0");
+    expectRefused(run("pages", 0), ErrorCode::Usage, "vertices 0");
+    expectRefused(run("vertices", 1), ErrorCode::Usage, "vertices 1");
+    fs::remove_all(plan() / "deal-0");
+    fs::rename(folder_ / "deal-0", plan() / "deal-0");
+    for (const PartStage& stage : stagesOf(2)) ASSERT_NO_FATAL_FAILURE(runAll(stage.name, stage.parts));
+    EXPECT_EQ(bytesOf(output()), whole_);
+}
+
 TEST_F(BuildParts, AnotherProgramIsRefused) {
     planned(2);
     std::string text = bytesOf(plan() / "plan.json");

@@ -53,6 +53,8 @@ refused "parts 0 to 2" "$vcp" build-step pages 3 --plan killed.vcp.parts
 rm -r killed.vcp.parts/vertices-1
 rm -r killed.vcp.parts/pages-*
 refused "vertices 1" "$vcp" build-step pages 0 --plan killed.vcp.parts --progress none
+refused "Read-only file system" env LD_PRELOAD="$library" FAIL_AT=1 FAIL_ERRNO=30 FAIL_ON=1 \
+    "$vcp" build-step vertices 1 --plan killed.vcp.parts --progress none
 if [ "$(id -u)" != 0 ]; then
     chmod a-w killed.vcp.parts
     refused "ermission" "$vcp" build-step vertices 1 --plan killed.vcp.parts --progress none
