@@ -5,7 +5,6 @@
 #include <fstream>
 #include <random>
 #include <thread>
-#include <tuple>
 
 #include <gtest/gtest.h>
 
@@ -139,15 +138,22 @@ TEST_F(BuildParts, MissingPartsAreNamed) {
     expectRefused(run("paint", 0), ErrorCode::Usage, "paint");
 }
 
+/// A part, how messages name it, and the stage that reads it.
+struct Read {
+    std::string stage;
+    unsigned number;
+    std::string by;
+
+    [[nodiscard]] std::string name() const { return stage + " " + std::to_string(number); }
+    [[nodiscard]] std::string folder() const { return stage + "-" + std::to_string(number); }
+};
+
 TEST_F(BuildParts, CutOffAndLostFilesNameTheirPart) {
     planned(3);
-    const std::tuple<const char*, const char*, const char*> readers[] = {
-        {"deal", "deal 0", "vertices"}, {"vertices", "vertices 1", "pages"}, {"pages", "pages 1", "merge"}};
-    for (const auto& [stage, part, reader] : readers) {
-        ASSERT_NO_FATAL_FAILURE(runAll(stage, std::string(stage) == "deal" ? 1 : 3));
-        const fs::path partFolder = plan() / (stage + std::string(1, '-') + part[std::string(part).size() - 1]);
+    for (const Read& part : {Read{"deal", 0, "vertices"}, Read{"vertices", 1, "pages"}, Read{"pages", 1, "merge"}}) {
+        ASSERT_NO_FATAL_FAILURE(runAll(part.stage, part.stage == "deal" ? 1 : 3));
         size_t tried = 0;
-        for (const auto& each : fs::directory_iterator(partFolder)) {
+        for (const auto& each : fs::directory_iterator(plan() / part.folder())) {
             const fs::path file = each.path();
             const auto size = fs::file_size(file);
             if (size == 0) continue;
@@ -155,16 +161,16 @@ TEST_F(BuildParts, CutOffAndLostFilesNameTheirPart) {
             // A journal's line is whole without its end.
             const bool isJournal = file.filename() == "journal";
             fs::resize_file(file, isJournal ? size / 2 : size - 1);
-            expectRefused(run(reader, 0), ErrorCode::InvalidInput, part);
+            expectRefused(run(part.by, 0), ErrorCode::InvalidInput, part.name());
             fs::remove(file);
-            expectRefused(run(reader, 0), isJournal ? ErrorCode::Usage : ErrorCode::InvalidInput, part);
+            expectRefused(run(part.by, 0), isJournal ? ErrorCode::Usage : ErrorCode::InvalidInput, part.name());
             std::ofstream(file, std::ios::binary) << content;
             ++tried;
         }
-        EXPECT_GE(tried, std::string(stage) == "deal" ? 2u : 3u) << stage;
-        fs::remove_all(partFolder);
-        expectRefused(run(reader, 0), ErrorCode::Usage, part);
-        ASSERT_TRUE(run(stage, unsigned(part[std::string(part).size() - 1] - '0')).ok());
+        EXPECT_GE(tried, part.stage == "deal" ? 2u : 3u) << part.stage;
+        fs::remove_all(plan() / part.folder());
+        expectRefused(run(part.by, 0), ErrorCode::Usage, part.name());
+        ASSERT_TRUE(run(part.stage, part.number).ok());
     }
     ASSERT_TRUE(run("merge", 0).ok());
     EXPECT_EQ(bytesOf(output()), whole_);
@@ -172,23 +178,20 @@ TEST_F(BuildParts, CutOffAndLostFilesNameTheirPart) {
 
 TEST_F(BuildParts, WrongBytesNameTheirPart) {
     planned(2);
-    const std::tuple<const char*, const char*, const char*> readers[] = {
-        {"deal", "deal 0", "vertices"}, {"vertices", "vertices 0", "pages"}, {"pages", "pages 1", "merge"}};
-    for (const auto& [stage, part, reader] : readers) {
-        ASSERT_NO_FATAL_FAILURE(runAll(stage, std::string(stage) == "deal" ? 1 : 2));
-        const fs::path partFolder = plan() / (stage + std::string(1, '-') + part[std::string(part).size() - 1]);
-        for (const auto& each : fs::directory_iterator(partFolder)) {
+    for (const Read& part : {Read{"deal", 0, "vertices"}, Read{"vertices", 0, "pages"}, Read{"pages", 1, "merge"}}) {
+        ASSERT_NO_FATAL_FAILURE(runAll(part.stage, part.stage == "deal" ? 1 : 2));
+        for (const auto& each : fs::directory_iterator(plan() / part.folder())) {
             const std::string content = bytesOf(each.path());
             if (content.empty()) continue;
             std::string wrong = content;
             wrong[content.size() / 2] = char(wrong[content.size() / 2] ^ 16);
             std::ofstream(each.path(), std::ios::binary) << wrong;
-            Result<PartReport> refused;
-            for (unsigned i = 0; i < (std::string(reader) == "merge" ? 1u : 2u); ++i)
-                if (auto done = run(reader, i); !done) refused = done;
-            expectRefused(refused, ErrorCode::InvalidInput, part);
+            // One of the readers meets the byte.
+            auto refused = run(part.by, 0);
+            if (refused && part.by != "merge") refused = run(part.by, 1);
+            expectRefused(refused, ErrorCode::InvalidInput, part.name());
             std::ofstream(each.path(), std::ios::binary) << content;
-            for (unsigned i = 0; i < 2; ++i) fs::remove_all(plan() / (reader + std::string(i == 0 ? "-0" : "-1")));
+            for (const char* number : {"-0", "-1"}) fs::remove_all(plan() / (part.by + number));
         }
     }
     ASSERT_TRUE(run("merge", 0).ok());
