@@ -24,7 +24,7 @@ import shutil
 PROCESSORS_USED = 0.75
 PROCESS_BYTES, ALL_BYTES = 1e9, 20e9  # a second
 # Bytes a triangle that a stage reads and writes: the input, the soup (written, and read twice), bins, pages.
-STAGE_BYTES = {"deal": 19 + 3 * 40 + 67, "vertices": 67 + 72, "pages": 72 + 4, "merge": 4 + 4}
+STAGE_BYTES = {"plan": 19, "deal": 19 + 3 * 40 + 67, "vertices": 67 + 72, "pages": 72 + 4, "merge": 4 + 4}
 
 
 def run(*words):
@@ -66,7 +66,7 @@ def simulated(seconds, parts, fewest, triangles, wanted, processors, by):
     hours = {}
     boundary = (seconds["merge"][0] - fewest["merge"][0]) / max(parts - 1, 1)
     levels = max(math.log(triangles, 4) - 6, 1)
-    for stage in ("deal", "vertices", "pages", "merge"):
+    for stage in STAGE_BYTES:
         count = by if stage in ("vertices", "pages") else 1
         mean = sum(seconds[stage]) / len(seconds[stage])
         slowest = max(chosen.choice(seconds[stage]) / mean for _ in range(count))
