@@ -22,3 +22,14 @@ done
 "$vcp" build small.ply -o small.vcp --overwrite --progress none
 "$hostile_files" hostile.bin 1000 "$here"/../../fuzz/seeds/fuzz_file/* small.vcp
 "$node" "$here/module_test.mjs" "$folder" scan.vcp hostile.bin whole close
+# The folder is a package for npm that needs no other one.
+if command -v npm >/dev/null; then
+    (cd "$web" && npm pack --dry-run --json --offline 2>/dev/null) >package_files.json
+    "$node" -e '
+        const files = JSON.parse(require("fs").readFileSync("package_files.json"))[0].files.map(file => file.path).sort();
+        const expected = ["README.md", "camera.js", "fzstd.LICENSE", "fzstd.js", "markup.js", "module.js", "package.json",
+            "ranges.js", "vcp-viewer.d.ts", "vcp-viewer.js", "vcp.wasm", "worker.js"];
+        require("assert").deepEqual(files, expected);
+        require("assert").equal(JSON.parse(require("fs").readFileSync(process.argv[1])).dependencies, undefined);
+    ' "$web/package.json"
+fi
