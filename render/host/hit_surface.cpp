@@ -63,6 +63,7 @@ glm::vec4 colourAt(const HostScene& scene, const TileHits& hits, int pixel) {
     const HitLeaf& leaf = hits.leaves[hits.leaf[pixel]];
     const PageView& view = *scene.page(leaf.page).view;
     if (view.faceColours.empty() && view.vertexColours.empty()) return glm::vec4(0);
+    if (hits.blended[size_t(pixel)]) return hits.colour[pixel];
     if (nodeType(leaf.node) == kNodeSoft) return softColour(view, leaf.node, placeOf(hits, pixel));
     if (nodeType(leaf.node) == kNodeSlab)
         return glm::unpackUnorm4x8(vectorWord(view.faceColours, slabVector(leaf.node)));

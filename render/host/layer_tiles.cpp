@@ -11,6 +11,7 @@
 #include "render/host/hit_light.h"
 #include "render/host/hit_surface.h"
 #include "render/host/section_caps.h"
+#include "render/host/slab_blend.h"
 
 namespace vcp {
 
@@ -48,6 +49,7 @@ LayerTiles::LayerTiles(const HostLayer& layer, glm::ivec2 size)
 void LayerTiles::cast(TileHits& hits) const {
     castTile(layer_.scene, layer_.rays, hits);
     if (layer_.caps != Caps::None) castCaps(layer_.scene, layer_.rays, layer_.caps, hits, cameraMarks());
+    blendSlabs(layer_.scene, layer_.rays, {layer_.frame.pixelEdge, layer_.frame.pixelEdgePerDepth}, hits);
     if (layer_.marks != nullptr) markPages(hits);
     if (layer_.frame.opacity < 1) fade(hits);
 }

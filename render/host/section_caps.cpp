@@ -131,7 +131,7 @@ void setCap(TileHits& hits, int i, double depth, glm::dvec3 normal, const WalkEn
     hits.normalX[i] = float(normal.x), hits.normalY[i] = float(normal.y), hits.normalZ[i] = float(normal.z);
     hits.onCap.set(size_t(i));
     if (hits.leaves.empty() || hits.leaves.back().node != wall.word || hits.leaves.back().page != wall.page)
-        hits.leaves.push_back({wall.page, wall.word, {}});
+        hits.leaves.push_back({.page = wall.page, .node = wall.word});
     hits.leaf[i] = uint32_t(hits.leaves.size() - 1);
 }
 

@@ -26,6 +26,7 @@ public:
         hits_.any = false;
         hits_.onCap.reset();
         hits_.leaves.clear();
+        hits_.widestSlab = 0;
         while (!walk_.isDone() && open_ != 0) {
             const WalkEntry at = walk_.next();
             if (isNode(at))
@@ -165,7 +166,9 @@ private:
             found = true;
             finish(i, hit, hn::Set(Words(), number));
         }
-        if (found) hits_.leaves.push_back({at.page, at.word, {}});
+        if (!found) return;
+        hits_.leaves.push_back({.page = at.page, .node = at.word, .corner = at.corner, .bits = at.bits});
+        if (nodeType(at.word) == kNodeSlab) hits_.widestSlab = std::max(hits_.widestSlab, float(cellsOf(at.bits)));
     }
 
     /// A group's rays in `hit` go no farther.
@@ -211,7 +214,7 @@ private:
             if (triangles.number[t] == Triangles::kNoNumber) {
                 triangles.number[t] = uint32_t(hits_.leaves.size());
                 const auto& corners = triangles.corners;
-                hits_.leaves.push_back({at.page, at.word, {corners[0][t], corners[1][t], corners[2][t]}});
+                hits_.leaves.push_back({at.page, at.word, {corners[0][t], corners[1][t], corners[2][t]}, {}, 0});
             }
             takeTriangle(triangles, t, group, taken, inLeaf_[i]);
         }

@@ -7,6 +7,7 @@
 
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
+#include <glm/vec4.hpp>
 
 #include "octree/page/strips.h"
 
@@ -14,11 +15,13 @@ namespace vcp {
 
 inline constexpr int kTileWidth = 16, kTileHeight = 8, kTilePixels = kTileWidth * kTileHeight;
 
-/// A soft leaf, or a triangle of a hard leaf, that rays of the tile hit.
+/// A soft or slab leaf, or a triangle of a hard leaf, that rays of the tile hit.
 struct HitLeaf {
-    uint32_t page;   ///< of the scene (HostScene::page)
-    uint32_t node;   ///< the leaf's node word
-    Index3 corners;  ///< the triangle's vertices in the page; of hard leaves only
+    uint32_t page;         ///< of the scene (HostScene::page)
+    uint32_t node;         ///< the leaf's node word
+    Index3 corners = {};   ///< the triangle's vertices in the page; of hard leaves only
+    glm::uvec3 corner{0};  ///< the leaf's lowest corner, subcells; of soft and slab leaves only
+    uint32_t bits = 0;     ///< log2 of the leaf's edge in subcells; likewise
 };
 
 /// The first hits of a tile's rays. Element y * kTileWidth + x of an array belongs to pixel corner + (x, y); those
@@ -29,8 +32,8 @@ struct TileHits {
     bool any = false;                        ///< false: no ray hit, and nothing below is written
     alignas(32) float depth[kTilePixels];    ///< world units; infinite where a ray hit nothing
     alignas(32) uint32_t leaf[kTilePixels];  ///< element of `leaves`; undefined where a ray hit nothing
-    /// The hit in leaf space where a soft leaf is hit; else the weights of the triangle's second and third vertex, and
-    /// 0.
+    /// The hit in leaf space where a soft or slab leaf is hit; else the weights of the triangle's second and third
+    /// vertex, and 0.
     alignas(32) float x[kTilePixels], y[kTilePixels], z[kTilePixels];
     /// A number with the sign of the side that the ray came from (sideBefore in shared/leaf_math.h); soft leaves only.
     alignas(32) float side[kTilePixels];
@@ -39,6 +42,9 @@ struct TileHits {
     alignas(32) float normalX[kTilePixels], normalY[kTilePixels], normalZ[kTilePixels];
     std::bitset<kTilePixels> onCap;  ///< where the cap of a section is hit (section_caps.h)
     std::vector<HitLeaf> leaves;
+    float widestSlab = 0;              ///< edge of the largest slab leaf among them, finest cells
+    std::bitset<kTilePixels> blended;  ///< where the normal and `colour` are blends of slabs (slab_blend.h)
+    glm::vec4 colour[kTilePixels];     ///< undefined elsewhere
 };
 
 }  // namespace vcp
