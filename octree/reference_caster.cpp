@@ -383,7 +383,10 @@ Result<ReferenceCaster> ReferenceCaster::create(const PageCache& cache, std::spa
 }
 
 std::optional<RayHit> ReferenceCaster::cast(const Ray& ray, CastCounters* counters) const {
-    return CastWalk(*this, ray, counters, nullptr).run();
+    auto hit = CastWalk(*this, ray, counters, nullptr).run();
+    if (hit && nodeType(hit->node) == kNodeSlab && std::isfinite(options_.pixelEdge))
+        hit->normal = blendedNormal(ray, *hit);
+    return hit;
 }
 
 std::vector<RayHit> ReferenceCaster::castAll(const Ray& ray, CastCounters* counters) const {

@@ -92,6 +92,9 @@ struct CastCounters {
 struct CastOptions {
     bool singlePrecision = false;  ///< leaf maths in float (f32), as on the GPU; traversal stays in double
     int steps = 64;                ///< Illinois steps; 64 are full precision, a GPU makes a few
+    /// A pixel's edge at a distance t: pixelEdge + pixelEdgePerT * t, world units. Normals of slab leaves that are
+    /// wider are blended with those about them (shared/slab_blend.h).
+    double pixelEdge = std::numeric_limits<double>::infinity(), pixelEdgePerT = 0;
 };
 
 class ReferenceCaster {
@@ -104,7 +107,7 @@ public:
     /// Returns the first hit with tMin <= t <= tMax. Any thread; counters belong to the caller.
     [[nodiscard]] std::optional<RayHit> cast(const Ray& ray, CastCounters* counters = nullptr) const;
 
-    /// Returns the first hit in each leaf that the ray meets, sorted by t; for verification.
+    /// Returns the first hit in each leaf that the ray meets, sorted by t, no normals blended; for verification.
     [[nodiscard]] std::vector<RayHit> castAll(const Ray& ray, CastCounters* counters = nullptr) const;
 
     [[nodiscard]] const PageCache& cache() const { return *cache_; }
@@ -112,6 +115,8 @@ public:
 private:
     enum class Mark : uint8_t { None, Above, Chosen };
     ReferenceCaster(const PageCache& cache, CastOptions options) : cache_(&cache), options_(options) {}
+    /// Returns the normal that is seen of a hit on a slab leaf.
+    [[nodiscard]] glm::dvec3 blendedNormal(const Ray& ray, const RayHit& hit) const;
 
     const PageCache* cache_;
     CastOptions options_;

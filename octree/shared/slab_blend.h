@@ -2,20 +2,28 @@
 // GLSL (Real = float) and as C++ in float and double (octree/surface/slab_blend.h), after leaf_math.h. Only the common
 // subset of GLSL and GLM is used.
 //
-// Eight cells of the hit leaf's size have their centres about the hit: the dual cell. Each that lies in a slab leaf of
-// this size or a larger one counts by its trilinear weight and by how near the hit is to its plane. Those that do not
-// (empty, parted, triangles) have no weight, and the others count for more.
+// The leaves count that meet at the hit leaf's corner next to the hit. A slab counts by its trilinear weight, as if all
+// were of the hit leaf's size, and by how near the hit is to its plane. Leaves that are none (empty, triangles) have no
+// weight, and the others count for more.
+
+// Word of a page's header with the node of the whole page: of what is drawn of it, an octant may be left alone.
+const uint kPageHeaderRoot = 2u;
 
 // Returns by how much the neighbours of a leaf count that is so many pixels wide. Up to one pixel they do not: there
 // samples filter the light. From two on they do wholly; in between nothing jumps.
 INLINE Real slabBlendShare(Real pixels) { return clamp(pixels - Real(1.0), Real(0.0), Real(1.0)); }
 
-// Returns the lowest corner of the dual cell's lowest cell, -1 or 0 on each axis, for a hit at x in leaf space.
-INLINE Real3 dualCorner(Real3 x) { return floor(clamp(x, Real3(0.0), Real3(1.0)) - Real3(0.5)); }
+// Returns the leaf's corner next to a point in leaf space: 0 or 1 on each axis.
+INLINE Real3 nearestCorner(Real3 x) { return floor(clamp(x, Real3(0.0), Real3(1.0)) + Real3(0.5)); }
 
-// Returns the trilinear weight of one of the eight cells, octant x + 2y + 4z.
-INLINE Real dualWeight(Real3 x, uint octant) {
-    Real3 upper = clamp(x, Real3(0.0), Real3(1.0)) - Real3(0.5) - dualCorner(x);
+// Returns the octant about that corner that the leaf itself is in, x + 2y + 4z.
+INLINE uint octantOfLeaf(Real3 corner) {
+    return (corner.x > Real(0.5) ? 0u : 1u) | (corner.y > Real(0.5) ? 0u : 2u) | (corner.z > Real(0.5) ? 0u : 4u);
+}
+
+// Returns the trilinear weight at x of the leaf in an octant about the corner next to x.
+INLINE Real octantWeight(Real3 x, uint octant) {
+    Real3 upper = clamp(x, Real3(0.0), Real3(1.0)) + Real3(0.5) - nearestCorner(x);
     bvec3 high = bvec3((octant & 1u) != 0u, (octant & 2u) != 0u, (octant & 4u) != 0u);
     Real3 w = mix(Real3(1.0) - upper, upper, high);
     return w.x * w.y * w.z;

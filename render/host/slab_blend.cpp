@@ -30,11 +30,11 @@ struct NearSlab {
     glm::vec3 normal, low;      ///< of its plane; the lowest corner of its leaf
     float offset, inverseEdge;  ///< of its plane, in its leaf's edges; of its leaf
     glm::vec4 colour;
-    uint32_t octant;  ///< of the dual cell
+    uint32_t octant;  ///< about the corner that the leaves meet at
 };
 
-/// The slabs in the cells of a dual cell, the hit leaf's first.
-struct DualCell {
+/// The slabs that meet at a corner of a leaf, the leaf's own first.
+struct SlabsAtCorner {
     uint32_t key = ~0u;
     size_t count = 0;
     std::array<NearSlab, 8> slabs;
@@ -46,55 +46,54 @@ public:
 
     /// Returns what is seen of a pixel's hit on a slab leaf, the normal turned to no side. `x`: the hit in leaf space.
     f32::SlabBlend blend(int pixel, glm::vec3 x, float share) {
-        const DualCell& cell = dualCellAt(hits_.leaf[pixel], glm::ivec3(f32::dualCorner(x)));
-        const glm::vec3 own = cell.slabs[0].normal;
+        const SlabsAtCorner& at = slabsAt(hits_.leaf[pixel], f32::nearestCorner(x));
+        const glm::vec3 own = at.slabs[0].normal;
         f32::SlabBlend sum{glm::vec3(0), glm::vec4(0), 0};
-        for (size_t i = 0; i < cell.count; ++i) {
-            const NearSlab& slab = cell.slabs[i];
+        for (size_t i = 0; i < at.count; ++i) {
+            const NearSlab& slab = at.slabs[i];
             const float nearness =
                 f32::slabNearness(slab.normal, slab.offset, (x - slab.low) * slab.inverseEdge - 0.5f);
-            const float weight = nearness * f32::dualWeight(x, slab.octant) * (i == 0 ? 1.0f : share);
+            const float weight = nearness * f32::octantWeight(x, slab.octant) * (i == 0 ? 1.0f : share);
             sum = f32::withSlab(sum, slab.normal, slab.colour, weight, own);
         }
         return sum;
     }
 
 private:
-    const DualCell& dualCellAt(uint32_t leaf, glm::ivec3 lowest) {
-        const uint32_t own = uint32_t(-lowest.x) | uint32_t(-lowest.y) << 1 | uint32_t(-lowest.z) << 2;
-        const uint32_t key = leaf << 3 | own;
-        DualCell& cell = kept_[key % kept_.size()];
-        if (cell.key != key) cell = dualCell(hits_.leaves[leaf], lowest, own);
-        cell.key = key;
-        return cell;
+    const SlabsAtCorner& slabsAt(uint32_t leaf, glm::vec3 corner) {
+        const uint32_t own = f32::octantOfLeaf(corner), key = leaf << 3 | own;
+        SlabsAtCorner& slabs = kept_[key % kept_.size()];
+        if (slabs.key != key) slabs = find(hits_.leaves[leaf], glm::ivec3(corner), own);
+        slabs.key = key;
+        return slabs;
     }
 
-    /// `own`: the octant of the dual cell that the leaf is.
-    [[nodiscard]] DualCell dualCell(const HitLeaf& leaf, glm::ivec3 lowest, uint32_t own) const {
-        const int edge = 1 << leaf.bits;
-        const glm::ivec3 corner(leaf.corner), from = corner + lowest * edge, to = from + edge;
-        DualCell cell;
-        add(cell, leaf, corner, {leaf.bits, leaf.page, leaf.node}, own);
-        const glm::ivec3 apart = from ^ to;
+    /// `corner`: of the leaf, 0 or 1 on each axis; `own`: the octant about it that the leaf is in.
+    [[nodiscard]] SlabsAtCorner find(const HitLeaf& leaf, glm::ivec3 corner, uint32_t own) const {
+        // The subcells about the corner are in the leaves that meet there.
+        const glm::ivec3 above = glm::ivec3(leaf.corner) + (corner << int(leaf.bits)), below = above - 1;
+        SlabsAtCorner slabs;
+        add(slabs, leaf, glm::ivec3(leaf.corner), {leaf.bits, leaf.page, leaf.node}, own);
+        const glm::ivec3 apart = below ^ above;
         const auto apartBits = uint32_t(std::bit_width(uint32_t(apart.x | apart.y | apart.z)));
-        const TreeBox common = descend(rootAbout(leaf.page, from, to), from, apartBits);
+        const TreeBox common = descend(rootAbout(leaf.page, below, above), below, apartBits);
         for (uint32_t octant = 0; octant < 8; ++octant) {
-            const glm::ivec3 at = from + edge * glm::ivec3(octant & 1, octant >> 1 & 1, octant >> 2);
-            if (octant != own && isInside(at)) add(cell, leaf, at, descend(common, at, leaf.bits), octant);
+            const glm::ivec3 at = below + glm::ivec3(octant & 1, octant >> 1 & 1, octant >> 2);
+            if (octant != own && isInside(at)) add(slabs, leaf, at, descend(common, at, 0), octant);
         }
-        return cell;
+        return slabs;
     }
 
     [[nodiscard]] bool isInside(glm::ivec3 at) const {
         return (uint32_t(at.x) | uint32_t(at.y) | uint32_t(at.z)) >> scene_.rootBits() == 0;
     }
 
-    /// Returns the root of a page where it holds both cells, also octants that are not drawn; else the scene's.
-    [[nodiscard]] TreeBox rootAbout(uint32_t page, glm::ivec3 from, glm::ivec3 to) const {
+    /// Returns the root of a page where it holds both subcells, also with octants that are not drawn; else the scene's.
+    [[nodiscard]] TreeBox rootAbout(uint32_t page, glm::ivec3 below, glm::ivec3 above) const {
         const HostScene::Page& of = scene_.page(page);
         const uint32_t bits = scene_.grid().log2Cells + of.cellBits + kMaxSubcellDepth;
         const glm::ivec3 place = glm::ivec3(of.corner) >> int(bits);
-        if (from >> int(bits) == place && to >> int(bits) == place) return {bits, page, of.view->header.root};
+        if (below >> int(bits) == place && above >> int(bits) == place) return {bits, page, of.view->header.root};
         return childBox(scene_.root(), scene_.rootBits());
     }
 
@@ -118,14 +117,14 @@ private:
         return box;
     }
 
-    /// Adds what a box has in a cell, where that is a slab.
-    void add(DualCell& cell, const HitLeaf& leaf, glm::ivec3 at, const TreeBox& box, uint32_t octant) const {
+    /// Adds the box that holds a subcell, where it is a slab leaf.
+    void add(SlabsAtCorner& slabs, const HitLeaf& leaf, glm::ivec3 at, const TreeBox& box, uint32_t octant) const {
         if (hasChildren(box) || nodeType(box.word) != kNodeSlab) return;
         const PageView& view = *scene_.page(box.page).view;
         const uint32_t vector = slabVector(box.word), code = vectorWord(view.faces, vector);
         const glm::ivec3 corner = at >> int(box.bits) << int(box.bits);
         const float scale = 1.0f / float(1u << leaf.bits);
-        NearSlab& slab = cell.slabs[cell.count++];
+        NearSlab& slab = slabs.slabs[slabs.count++];
         slab.normal = f32::decodeDirection(code >> kSlabDirectionShift);
         slab.offset = f32::slabOffset(code);
         slab.low = glm::vec3(corner - glm::ivec3(leaf.corner)) * scale;
@@ -137,7 +136,7 @@ private:
 
     const HostScene& scene_;
     const TileHits& hits_;
-    std::array<DualCell, 32> kept_;  ///< of hits side by side, by the lowest bits of their keys
+    std::array<SlabsAtCorner, 32> kept_;  ///< those that were found last, by the lowest bits of their keys
 };
 
 }  // namespace

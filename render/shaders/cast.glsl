@@ -19,9 +19,6 @@ struct Page {
     uint record;   // number in the table
 };
 
-// Returns an exact power of two.
-float powerOfTwo(int exponent) { return uintBitsToFloat(uint(127 + exponent) << 23); }
-
 // How far the ray has come: along each axis, planes up to this distance are behind it. The three differ by the last
 // bit at most: a ray through an edge or a corner crosses one plane after the other, so that it meets the pages beside
 // the edge too (as leaveBox does with leaves).
@@ -250,7 +247,7 @@ float castPage(Ray ray, Page page, float s, float until, inout Hit hit, inout Wo
             // Each kind is in a loop of its own, as in surfaceAt.
             bool slab = type == kNodeSlab, soft = type == kNodeSoft;
             while (slab) {
-                found = castSlab(page.sections.faces, descent.node, lo, edge, segment, work);
+                found = castSlab(page.sections.faces, descent.node, lo, edge, segment, hit, work);
                 slab = false;
             }
             while (soft) {
@@ -263,6 +260,10 @@ float castPage(Ray ray, Page page, float s, float until, inout Hit hit, inout Wo
         found = castHard(page.sections, descent.node, segment, local.direction, hit, work);
     }
     hit.leaf = descent.node;
+    int cellBits = page.bits - int(frame.log2Cells);
+    bool slab = nodeType(descent.node) == kNodeSlab;
+    if (slab) hit.at.w = float(cellBits - int(kMaxSubcellDepth) + descent.bits - 1);
+    if (slab) hit.corners = uvec3(page.corner + ivec3(lo * powerOfTwo(cellBits)));
     return found >= 0.0 ? sStart + found * page.cell : kNoHit;
 }
 

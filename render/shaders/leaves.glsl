@@ -1,5 +1,6 @@
 // Casts a ray against the leaves of a page, and finds what is seen of a hit.
 #include "octree/shared/leaf_math.h"
+#include "octree/shared/slab_blend.h"
 #include "render/shaders/page_walk.glsl"
 
 const int kIllinoisSteps = 8;
@@ -10,9 +11,9 @@ struct Hit {
     int pageBits;  // log2 of the page's edge on the lattice
     uint leaf;     // its node
     // Soft: the point in leaf space, and the side the ray came from (sideBefore). Hard: weights of the second and third
-    // vertex.
+    // vertex. Slab: the point in leaf space, and log2 of the leaf's edge on the lattice.
     vec4 at;
-    uvec3 corners;  // hard: the triangle's vertices
+    uvec3 corners;  // hard: the triangle's vertices; slab: the leaf's lowest corner on the lattice
 };
 
 // What is seen of a hit.
@@ -25,6 +26,9 @@ struct Surface {
 struct Work {
     uint steps, cells, fetches;
 };
+
+// Returns an exact power of two.
+float powerOfTwo(int exponent) { return uintBitsToFloat(uint(127 + exponent) << 23); }
 
 // Returns the distance along the page's ray of the crossing in a soft leaf, or -1.
 float castSoft(uint faces, uint node, vec3 lo, float edge, LeafSegment s, inout Hit hit, inout Work work) {
@@ -46,15 +50,16 @@ float castSoft(uint faces, uint node, vec3 lo, float edge, LeafSegment s, inout 
 
 // Returns the distance along the page's ray of the hit in a slab leaf, or -1. Where the ray begins in the leaf, what
 // lies at its begin does not count: it may be the surface that it comes from.
-float castSlab(uint faces, uint node, vec3 lo, float edge, LeafSegment s, inout Work work) {
+float castSlab(uint faces, uint node, vec3 lo, float edge, LeafSegment s, inout Hit hit, inout Work work) {
     if (kCountSteps != 0u) {
         work.cells++;
         work.fetches++;
     }
     uint code = fetchWord(faces, node & kSlabVectorMask);
     float scale = 1.0 / edge;  // a power of two: exact
-    float u = intersectSlab(code, node >> kSlabOctantsShift & kSlabOctantsMask, (s.from - lo) * scale,
-                            (s.to - s.from) * scale);
+    vec3 p = (s.from - lo) * scale, d = (s.to - s.from) * scale;
+    float u = intersectSlab(code, node >> kSlabOctantsShift & kSlabOctantsMask, p, d);
+    hit.at.xyz = p + u * d;
     bool counts = u > 0.0 || (u == 0.0 && s.fromWall);
     return counts ? s.tauFrom + u * (s.tauTo - s.tauFrom) : -1.0;
 }
@@ -165,11 +170,99 @@ vec3 slabDirection(uint node, uint faces) {
     return decodeDirection(fetchWord(faces, node & kSlabVectorMask) >> kSlabDirectionShift);
 }
 
+vec4 slabColour(uint node, uint colourFaces) {
+    uint vector = node & kSlabVectorMask;
+    return unpackUnorm4x8(texelWord(fetchColour(colourFaces + (vector >> 2)), vector & 3u));
+}
+
+// A box of the page tree, or of a page's octree.
+struct TreeBox {
+    int bits;     // log2 of its edge on the lattice
+    uint record;  // number of its page in the table; or its own, where it is of the page tree
+    uint word;    // node word; that of an internal node in the page tree
+    uint nodes;   // texel of the page's nodes; 0: a box of the page tree
+};
+
+// Goes down to the box of 2^bits lattice units at a place, or to the leaf that holds it. Loads are used as descend()
+// of page_walk.glsl says.
+TreeBox descendTo(TreeBox box, ivec3 place, int bits) {
+    while (box.word >> kNodeTypeShift == kNodeInternal && box.bits > bits) {
+        box.bits--;
+        uint octant = octantAt(place, box.bits);
+        if (box.nodes != 0u) {
+            box.word = fetchWord(box.nodes + 2u * (box.word & kNodePayloadMask), octant);
+        } else {
+            TableNode parent = fetchTableNode(box.record);
+            bool exists = hasOctant(parent, octant);
+            box.record = exists ? childIn(parent, octant) : box.record;
+            TableNode child = fetchTableNode(box.record);
+            bool isPage = (child.flags & kRecordInCut) != 0u;
+            box.nodes = exists && isPage ? child.pageTexel + kPageHeaderBytes / 16u : 0u;
+            box.word = !exists ? kNodeEmpty << kNodeTypeShift : isPage ? child.root : 0u;
+        }
+    }
+    return box;
+}
+
+// Returns the root of the hit's page where it holds both points of the lattice, also with octants that are not drawn;
+// else that of the page tree.
+TreeBox rootAbout(Hit hit, ivec3 below, ivec3 above) {
+    ivec3 place = ivec3(hit.corners) >> hit.pageBits;
+    bool inPage = below >> hit.pageBits == place && above >> hit.pageBits == place;
+    TableNode record = fetchTableNode(inPage ? hit.record : 0u);
+    bool isPage = inPage || (record.flags & kRecordInCut) != 0u;
+    uint nodes = record.pageTexel + kPageHeaderBytes / 16u;
+    uint root = inPage ? fetchWord(record.pageTexel, kPageHeaderRoot) : record.root;
+    return TreeBox(inPage ? hit.pageBits : int(kLatticeBits), inPage ? hit.record : 0u, isPage ? root : 0u,
+                   isPage ? nodes : 0u);
+}
+
+// Returns the blend of the slabs about a hit, the normal turned to no side. `own`: the hit leaf's direction.
+SlabBlend blendSlabs(Hit hit, vec3 own, float share) {
+    int leafBits = int(hit.at.w);
+    vec3 x = hit.at.xyz, corner = nearestCorner(x);
+    ivec3 low = ivec3(hit.corners), above = low + (ivec3(corner) << leafBits), below = above - 1;
+    ivec3 apart = below ^ above;
+    TreeBox holdsAll = descendTo(rootAbout(hit, below, above), below, findMSB(uint(apart.x | apart.y | apart.z)) + 1);
+    uint ownOctant = octantOfLeaf(corner);
+    float edge = powerOfTwo(leafBits);
+    SlabBlend sum = SlabBlend(vec3(0.0), vec4(0.0), 0.0);
+    DONT_UNROLL for (uint octant = 0u; octant < 8u; octant++) {
+        ivec3 place = below + ivec3(octant & 1u, octant >> 1 & 1u, octant >> 2);
+        bool inside = all(greaterThanEqual(place, ivec3(0))) && all(lessThan(place, ivec3(1 << kLatticeBits)));
+        TreeBox box = holdsAll;
+        if (!inside) box.word = kNodeEmpty << kNodeTypeShift;
+        box = descendTo(box, place, 0);
+        bool slab = nodeType(box.word) == kNodeSlab;
+        while (slab) {
+            uint code = fetchWord(fetchTableSections(box.record).faces, box.word & kSlabVectorMask);
+            vec3 n = decodeDirection(code >> kSlabDirectionShift);
+            vec3 boxLow = vec3((place >> box.bits << box.bits) - low);
+            vec3 fromCentre = (x * edge - boxLow) * powerOfTwo(-box.bits) - 0.5;
+            float weight = slabNearness(n, slabOffset(code), fromCentre) * octantWeight(x, octant) *
+                           (octant == ownOctant ? 1.0 : share);
+            vec4 colour = vec4(0.0);
+            if (kColour != 0u) colour = slabColour(box.word, fetchTableColours(box.record).faces);
+            sum = withSlab(sum, n, colour, weight, own);
+            slab = false;
+        }
+    }
+    return sum;
+}
+
 Surface slabSurface(Hit hit, uint faces, uint colourFaces, vec3 direction) {
-    uint vector = hit.leaf & kSlabVectorMask;
-    Surface surface = Surface(turnedTo(slabDirection(hit.leaf, faces), -direction), vec4(0.0));
-    if (kColour != 0u)
-        surface.colour = unpackUnorm4x8(texelWord(fetchColour(colourFaces + (vector >> 2)), vector & 3u));
+    vec3 own = slabDirection(hit.leaf, faces);
+    Surface surface = Surface(own, vec4(0.0));
+    if (kColour != 0u) surface.colour = slabColour(hit.leaf, colourFaces);
+    float edge = powerOfTwo(int(frame.finestLevel + frame.log2Cells) + int(hit.at.w) - int(kLatticeBits));
+    float share = hit.at.w < 0.0 ? 0.0 : slabBlendShare(edge / pixelEdgeAt(hit.depth));
+    bool wide = share > 0.0;
+    while (wide) {
+        SlabBlend blend = blendSlabs(hit, own, share);
+        if (dot(blend.normal, blend.normal) > 0.0) surface = Surface(blend.normal, blend.colour / blend.weight);
+        wide = false;
+    }
+    surface.normal = turnedTo(surface.normal, -direction);
     return surface;
 }
 

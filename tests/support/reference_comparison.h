@@ -51,15 +51,25 @@ inline std::vector<NamedCamera> cameras(const Scene& scene) { return cameras(sce
 
 struct Comparison {
     uint64_t hit = 0, miss = 0, missed = 0, wrong = 0;
+    uint64_t otherNormal = 0;                          // hits whose normals differ by more than kSameNormal
     double depthMax = 0, depthSum = 0, normalMax = 0;  // cells, radians
 };
+constexpr double kSameNormal = 0.01;
+
+/// Options with the size of the picture's pixels.
+inline CastOptions castOptions(const Camera& camera, uint32_t width, uint32_t height) {
+    const double pixel = 2 * cameraBasis(camera, width, height).halfHeight / height;
+    if (camera.projection == Projection::Orthographic) return {.pixelEdge = pixel};
+    return {.pixelEdge = 0, .pixelEdgePerT = pixel};
+}
 
 /// Every pixel against the reference on the same cut. Hits that differ by more than two cells are `wrong`.
 inline Comparison compare(Renderer& renderer, const Scene& scene, const FrameRequest& request) {
     const std::vector<uint64_t> ones(scene.dataset->pages.size(), 1);
     const std::vector<uint8_t> all(ones.size(), 1), none(ones.size(), 0);
     const Selection selection = selectPages(*scene.dataset, selectionView(request), UINT64_MAX, ones, all, none);
-    const auto caster = ReferenceCaster::create(*scene.cache, selection.cut);
+    const auto caster = ReferenceCaster::create(*scene.cache, selection.cut,
+                                                castOptions(request.camera, request.width, request.height));
     EXPECT_TRUE(caster);
     const auto depth = renderer.readDepth();
     const auto normals = renderer.readNormals();
@@ -82,8 +92,9 @@ inline Comparison compare(Renderer& renderer, const Scene& scene, const FrameReq
             ++c.hit;
             c.depthSum += error;
             c.depthMax = std::max(c.depthMax, error);
-            c.normalMax =
-                std::max(c.normalMax, std::acos(std::min(1.0, glm::dot(glm::dvec3((*normals)[at]), expected->normal))));
+            const double angle = std::acos(std::min(1.0, glm::dot(glm::dvec3((*normals)[at]), expected->normal)));
+            c.otherNormal += angle > kSameNormal ? 1 : 0;
+            c.normalMax = std::max(c.normalMax, angle);
         }
     return c;
 }
