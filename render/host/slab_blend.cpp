@@ -93,7 +93,7 @@ private:
         const HostScene::Page& of = scene_.page(page);
         const uint32_t bits = scene_.grid().log2Cells + of.cellBits + kMaxSubcellDepth;
         const glm::ivec3 place = glm::ivec3(of.corner) >> int(bits);
-        if (below >> int(bits) == place && above >> int(bits) == place) return {bits, page, of.view->header.root};
+        if ((below >> int(bits)) == place && (above >> int(bits)) == place) return {bits, page, of.view->header.root};
         return childBox(scene_.root(), scene_.rootBits());
     }
 

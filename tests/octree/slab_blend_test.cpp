@@ -143,8 +143,8 @@ TEST(SlabBlend, NormalsOfASphereAreNearerToTheTruth) {
         }
         SCOPED_TRACE(testing::Message() << "level " << level << ", p95 " << quantile(plain, 0.95) << " and "
                                         << quantile(blended, 0.95));
-        EXPECT_GT(quantile(plain, 0.95), level == 0 ? 6 : 3) << "there is something to mend";
-        EXPECT_LT(quantile(blended, 0.95), 0.35 * quantile(plain, 0.95));
+        EXPECT_GT(quantile(plain, 0.95), level == 0 ? 5 : 2.5) << "there is something to mend";
+        EXPECT_LT(quantile(blended, 0.95), 0.15 * quantile(plain, 0.95));
         EXPECT_LT(quantile(blended, 1), 0.7 * quantile(plain, 1)) << "across the walls of pages, too";
     }
 }
@@ -152,7 +152,7 @@ TEST(SlabBlend, NormalsOfASphereAreNearerToTheTruth) {
 // Two spheres that nearly touch: what is across the gap does not count, nor turns normals over.
 TEST(SlabBlend, AFoldIsNotSmeared) {
     const double radius = 7;
-    for (const double gap : {0.4, 1.2, 2.4}) {
+    for (const double gap : {0.4, 0.8, 1.2, 2.4}) {
         SCOPED_TRACE(gap);
         const glm::dvec3 across = glm::normalize(glm::dvec3(0.9, 0.3, 0.2)), middle(16.2, 15.9, 16.1);
         const glm::dvec3 a = middle - (radius + gap / 2) * across, b = middle + (radius + gap / 2) * across;
@@ -175,15 +175,19 @@ TEST(SlabBlend, AFoldIsNotSmeared) {
         }
         SCOPED_TRACE(testing::Message() << "p95 " << quantile(plain, 0.95) << " and " << quantile(blended, 0.95)
                                         << ", worst " << quantile(plain, 1) << " and " << quantile(blended, 1));
-        EXPECT_LT(quantile(blended, 0.95), quantile(plain, 0.95));
-        EXPECT_LT(quantile(blended, 1), 1.1 * quantile(plain, 1));
+        EXPECT_LT(quantile(blended, 0.5), 0.3 * quantile(plain, 0.5));
+        EXPECT_LT(quantile(blended, 1), quantile(plain, 1));
+        // Where both spheres are in the same cells, their slabs are those of neither.
+        if (gap > 0.5) {
+            EXPECT_LT(quantile(blended, 0.95), 0.5 * quantile(plain, 0.95));
+        }
     }
 }
 
 TEST(SlabBlend, LeavesAsNarrowAsAPixelKeepTheirNormals) {
     const glm::dvec3 centre(16.1, 15.8, 16.3);
     const PageCache cache = slabsOf(test::sphere(centre, 12.3));
-    const Pair narrow(cache, 1, 1.0), wide(cache, 1, 0.9);
+    const Pair narrow(cache, 1, 1.0), wide(cache, 1, 0.99);
     Dice dice(5);
     double most = 0;
     for (int i = 0; i < 2000; ++i) {
@@ -194,8 +198,8 @@ TEST(SlabBlend, LeavesAsNarrowAsAPixelKeepTheirNormals) {
         EXPECT_EQ(kept->blended.normal, kept->plain.normal);
         most = std::max(most, degreesBetween(changed->blended.normal, changed->plain.normal));
     }
-    EXPECT_GT(most, 0.1);
-    EXPECT_LT(most, 1.5) << "nothing jumps";
+    EXPECT_GT(most, 0.01);
+    EXPECT_LT(most, 0.3) << "nothing jumps";
 }
 
 }  // namespace

@@ -42,8 +42,8 @@ template <class Visit>
 void forEachHit(const HostScene& scene, const Camera& camera, const CastOptions& pixels, const Visit& visit) {
     const PictureRays rays = pictureRays(camera, kWidth, kHeight);
     const double cell = scene.grid().cell;
-    const auto cast = castPicture(scene, rays, {.threads = 1}, [&](const TileHits& cast) {
-        TileHits hits = cast;
+    const auto cast = castPicture(scene, rays, {.threads = 1}, [&](const TileHits& unblended) {
+        TileHits hits = unblended;
         blendSlabs(scene, rays, {float(pixels.pixelEdge / cell), float(pixels.pixelEdgePerT)}, hits);
         for (int i = 0; hits.any && i < kTilePixels; ++i) {
             const glm::ivec2 in(i % kTileWidth, i / kTileWidth), at = hits.corner + in;
@@ -103,7 +103,9 @@ TEST(HostSlabBlend, EveryCameraAgreesWithTheReference) {
             EXPECT_LE(c.otherNormal * 1000, c.hits) << c.otherNormal << " of " << c.hits;
             blended += c.blended;
             // Wherever all leaves are wide, the sphere becomes rounder.
-            if (c.blended == c.hits) EXPECT_LT(c.blendedOff, 0.6 * c.plainOff);
+            if (c.blended == c.hits) {
+                EXPECT_LT(c.blendedOff, 0.6 * c.plainOff);
+            }
         }
     }
     EXPECT_GT(blended, 200000u);
