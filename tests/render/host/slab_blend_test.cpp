@@ -13,7 +13,7 @@
 namespace vcp {
 namespace {
 
-constexpr uint32_t kWidth = 250, kHeight = 187;
+constexpr uint32_t kWidth = 160, kHeight = 120;
 const glm::dvec3 kCentre = 64.0 * glm::dvec3(0.503, 0.497, 0.501);
 constexpr double kRadius = 26;
 
@@ -108,7 +108,7 @@ TEST(HostSlabBlend, EveryCameraAgreesWithTheReference) {
             }
         }
     }
-    EXPECT_GT(blended, 200000u);
+    EXPECT_GT(blended, 80000u);
 }
 
 TEST(HostSlabBlend, NarrowLeavesStayAsTheyAre) {
@@ -122,7 +122,7 @@ TEST(HostSlabBlend, NarrowLeavesStayAsTheyAre) {
         const glm::dvec3 alone = bent(surfaceAt(*host, tile, i, ray.direction).normal, ray.direction);
         EXPECT_LT(glm::distance(normalOf(tile, i, ray.direction), alone), 1e-5);
     });
-    EXPECT_GT(hits, 5000u);
+    EXPECT_GT(hits, 3000u);
 }
 
 /// Each vector's colour follows its leaf's normal.
@@ -161,7 +161,7 @@ TEST(HostSlabBlend, ColoursAreBlendedLikewise) {
                    alone.blended.reset();
                    plainOff += glm::distance(glm::vec3(colourAt(*host, alone, i)), truth);
                });
-    EXPECT_GT(hits, 5000u);
+    EXPECT_GT(hits, 3000u);
     EXPECT_GT(plainOff, 0.02 * double(hits)) << "there is something to mend";
     EXPECT_LT(blendedOff, 0.6 * plainOff);
 }
