@@ -4,6 +4,7 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <vector>
 
 #include <glm/geometric.hpp>
 #include <glm/packing.hpp>
@@ -35,14 +36,14 @@ struct NearSlab {
 
 /// The slabs that meet at a corner of a leaf, the leaf's own first.
 struct SlabsAtCorner {
-    uint32_t key = ~0u;
     size_t count = 0;
     std::array<NearSlab, 8> slabs;
 };
 
 class SlabBlender {
 public:
-    SlabBlender(const HostScene& scene, const TileHits& hits) : scene_(scene), hits_(hits) {}
+    SlabBlender(const HostScene& scene, const TileHits& hits)
+        : scene_(scene), hits_(hits), numbers_(8 * hits.leaves.size(), kNotFound) {}
 
     /// Returns what is seen of a pixel's hit on a slab leaf, the normal turned to no side. `x`: the hit in leaf space.
     f32::SlabBlend blend(int pixel, glm::vec3 x, float share) {
@@ -60,12 +61,16 @@ public:
     }
 
 private:
+    static constexpr uint32_t kNotFound = ~0u;
+
     const SlabsAtCorner& slabsAt(uint32_t leaf, glm::vec3 corner) {
-        const uint32_t own = f32::octantOfLeaf(corner), key = leaf << 3 | own;
-        SlabsAtCorner& slabs = kept_[key % kept_.size()];
-        if (slabs.key != key) slabs = find(hits_.leaves[leaf], glm::ivec3(corner), own);
-        slabs.key = key;
-        return slabs;
+        const uint32_t own = f32::octantOfLeaf(corner);
+        uint32_t& number = numbers_[8 * leaf + own];
+        if (number == kNotFound) {
+            number = uint32_t(found_.size());
+            found_.push_back(find(hits_.leaves[leaf], glm::ivec3(corner), own));
+        }
+        return found_[number];
     }
 
     /// `corner`: of the leaf, 0 or 1 on each axis; `own`: the octant about it that the leaf is in.
@@ -136,7 +141,8 @@ private:
 
     const HostScene& scene_;
     const TileHits& hits_;
-    std::array<SlabsAtCorner, 32> kept_;  ///< those that were found last, by the lowest bits of their keys
+    std::vector<SlabsAtCorner> found_;
+    std::vector<uint32_t> numbers_;  ///< among them, of each corner of the tile's leaves
 };
 
 }  // namespace
