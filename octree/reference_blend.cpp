@@ -62,7 +62,8 @@ glm::dvec3 ReferenceCaster::blendedNormal(const Ray& ray, const RayHit& hit) con
     const glm::dvec3 corner = f64::nearestCorner(x);
     const uint32_t ownOctant = f64::octantOfLeaf(corner);
     const auto directionOf = [](uint32_t code) { return f64::decodeDirection(code >> kSlabDirectionShift); };
-    const glm::dvec3 own = directionOf(vectorWord(cache_->view(hit.page)->faces, slabVector(hit.node)));
+    const glm::dvec3 own =
+        f64::turnedTo(directionOf(vectorWord(cache_->view(hit.page)->faces, slabVector(hit.node))), -ray.direction);
     const CornerPlace ends[] = {{ownLeaf.low + hit.leafEdge * corner, 0}, {ownLeaf.low + hit.leafEdge * corner, 7}};
     const bool inOwnPage = ends[0].isWithin(ownPage.low, pageEdge) && ends[1].isWithin(ownPage.low, pageEdge);
 
@@ -93,7 +94,7 @@ glm::dvec3 ReferenceCaster::blendedNormal(const Ray& ray, const RayHit& hit) con
     }
     const double length = glm::length(sum.normal);
     if (!(share > 0) || !(length > 0)) return hit.normal;
-    const glm::dvec3 normal = f64::turnedTo(sum.normal / length, -ray.direction);
+    const glm::dvec3 normal = sum.normal / length;
     return glm::normalize(normal - std::max(glm::dot(normal, ray.direction), 0.0) * ray.direction);
 }
 

@@ -49,7 +49,7 @@ LayerTiles::LayerTiles(const HostLayer& layer, glm::ivec2 size)
 void LayerTiles::cast(TileHits& hits) const {
     castTile(layer_.scene, layer_.rays, hits);
     if (layer_.caps != Caps::None) castCaps(layer_.scene, layer_.rays, layer_.caps, hits, cameraMarks());
-    blendSlabs(layer_.scene, layer_.rays, {layer_.frame.pixelEdge, layer_.frame.pixelEdgePerDepth}, hits);
+    blendSlabs(layer_.scene, {layer_.frame.pixelEdge, layer_.frame.pixelEdgePerDepth}, hits);
     if (layer_.marks != nullptr) markPages(hits);
     if (layer_.frame.opacity < 1) fade(hits);
 }

@@ -147,7 +147,7 @@ private:
 
 }  // namespace
 
-void blendSlabs(const HostScene& scene, const PictureRays& rays, PixelEdge pixel, TileHits& hits) {
+void blendSlabs(const HostScene& scene, PixelEdge pixel, TileHits& hits) {
     hits.blended.reset();
     if (!hits.any || hits.widestSlab == 0) return;
     const double cell = scene.grid().cell;
@@ -165,9 +165,9 @@ void blendSlabs(const HostScene& scene, const PictureRays& rays, PixelEdge pixel
         if (!(share > 0)) continue;
         const auto sum = blender.blend(i, {hits.x[i], hits.y[i], hits.z[i]}, share);
         if (!(glm::dot(sum.normal, sum.normal) > 0)) continue;
-        const glm::ivec2 at = hits.corner + glm::ivec2(i % kTileWidth, i / kTileWidth);
-        const glm::vec3 direction(rays.directionAt(at.x + 0.5, at.y + 0.5));
-        const glm::vec3 normal = f32::turnedTo(sum.normal, -direction);
+        // On the side of the hit leaf's normal, which has been turned to the ray.
+        const glm::vec3 normal =
+            f32::turnedTo(sum.normal, glm::vec3(hits.normalX[i], hits.normalY[i], hits.normalZ[i]));
         hits.normalX[i] = normal.x, hits.normalY[i] = normal.y, hits.normalZ[i] = normal.z;
         hits.blended.set(size_t(i));
         hits.colour[i] = sum.colour / sum.weight;

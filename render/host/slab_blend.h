@@ -3,7 +3,6 @@
 #pragma once
 
 #include "render/host/host_scene.h"
-#include "render/host/picture_rays.h"
 #include "render/host/tile_hits.h"
 
 namespace vcp {
@@ -15,6 +14,6 @@ struct PixelEdge {
 
 /// Blends the normals of a tile's hits on slab leaves that are wider than a pixel, and their colours where pages have
 /// them (TileHits::blended).
-void blendSlabs(const HostScene& scene, const PictureRays& rays, PixelEdge pixel, TileHits& hits);
+void blendSlabs(const HostScene& scene, PixelEdge pixel, TileHits& hits);
 
 }  // namespace vcp

@@ -217,7 +217,7 @@ TreeBox rootAbout(Hit hit, ivec3 below, ivec3 above) {
                    isPage ? nodes : 0u);
 }
 
-// Returns the blend of the slabs about a hit, the normal turned to no side. `own`: the hit leaf's direction.
+// Returns the blend of the slabs about a hit. `own`: the hit leaf's normal, to whose side others are turned.
 SlabBlend blendSlabs(Hit hit, vec3 own, float share) {
     int leafBits = int(hit.at.w);
     vec3 x = hit.at.xyz, corner = nearestCorner(x);
@@ -251,7 +251,7 @@ SlabBlend blendSlabs(Hit hit, vec3 own, float share) {
 }
 
 Surface slabSurface(Hit hit, uint faces, uint colourFaces, vec3 direction) {
-    vec3 own = slabDirection(hit.leaf, faces);
+    vec3 own = turnedTo(slabDirection(hit.leaf, faces), -direction);
     Surface surface = Surface(own, vec4(0.0));
     if (kColour != 0u) surface.colour = slabColour(hit.leaf, colourFaces);
     float edge = powerOfTwo(int(frame.finestLevel + frame.log2Cells) + int(hit.at.w) - int(kLatticeBits));
@@ -262,7 +262,6 @@ Surface slabSurface(Hit hit, uint faces, uint colourFaces, vec3 direction) {
         if (dot(blend.normal, blend.normal) > 0.0) surface = Surface(blend.normal, blend.colour / blend.weight);
         wide = false;
     }
-    surface.normal = turnedTo(surface.normal, -direction);
     return surface;
 }
 
