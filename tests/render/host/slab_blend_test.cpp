@@ -102,9 +102,9 @@ TEST(HostSlabBlend, EveryCameraAgreesWithTheReference) {
             const Counts c = compareWithReference(*scene.cache, cut, named.camera);
             EXPECT_GT(c.hits, 250u);
             hits += c.hits, blended += c.blended, otherNormals += c.otherNormal;
-            // Wherever all leaves are wide, the sphere becomes rounder.
+            // Where all leaves are blended, be it by a tenth, the sphere becomes rounder.
             if (c.blended == c.hits) {
-                EXPECT_LT(c.blendedOff, 0.6 * c.plainOff);
+                EXPECT_LT(c.blendedOff, 0.85 * c.plainOff);
             }
         }
     }
