@@ -15,7 +15,7 @@ here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 rm -rf "$folder"
 mkdir -p "$folder"
 cd "$folder"
-for triangles in 10000 60000; do
+for triangles in 10000 60000 300000; do
     "$make_scan" --triangles "$triangles" --colour -o scan.ply
     "$vcp" build scan.ply -o scan.vcp --overwrite --progress none
     "$vcp" publish scan.vcp -o "site$triangles" --viewer "$web" >/dev/null
