@@ -87,7 +87,7 @@ glm::dvec3 ReferenceCaster::blendedNormal(const Ray& ray, const RayHit& hit) con
         if (nodeType(node) != kNodeSlab) continue;
         const uint32_t code = vectorWord(view.faces, slabVector(node));
         const glm::dvec3 fromCentre = (ownLeaf.low + hit.leafEdge * x - box.low) / box.edge - 0.5;
-        const double weight = f64::octantWeight(x, octant) *
+        const double weight = f64::octantWeight(f64::shareAbove(x), octant) *
                               f64::slabNearness(directionOf(code), f64::slabOffset(code), fromCentre) *
                               (octant == ownOctant ? 1 : share);
         sum = f64::withSlab(sum, directionOf(code), glm::dvec4(0), weight, own);

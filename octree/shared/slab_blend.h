@@ -21,12 +21,15 @@ INLINE uint octantOfLeaf(Real3 corner) {
     return (corner.x > Real(0.5) ? 0u : 1u) | (corner.y > Real(0.5) ? 0u : 2u) | (corner.z > Real(0.5) ? 0u : 4u);
 }
 
-// Returns the trilinear weight at x of the leaf in an octant about the corner next to x.
-INLINE Real octantWeight(Real3 x, uint octant) {
-    Real3 upper = clamp(x, Real3(0.0), Real3(1.0)) + Real3(0.5) - nearestCorner(x);
-    bvec3 high = bvec3((octant & 1u) != 0u, (octant & 2u) != 0u, (octant & 4u) != 0u);
-    Real3 w = mix(Real3(1.0) - upper, upper, high);
-    return w.x * w.y * w.z;
+// Returns how much what is above that corner counts at a point, on each axis: 0 to 1.
+INLINE Real3 shareAbove(Real3 x) { return clamp(x, Real3(0.0), Real3(1.0)) + Real3(0.5) - nearestCorner(x); }
+
+// Returns the trilinear weight of the leaf in an octant about the corner. `above`: shareAbove of the hit.
+INLINE Real octantWeight(Real3 above, uint octant) {
+    Real x = (octant & 1u) != 0u ? above.x : Real(1.0) - above.x;
+    Real y = (octant & 2u) != 0u ? above.y : Real(1.0) - above.y;
+    Real z = (octant & 4u) != 0u ? above.z : Real(1.0) - above.z;
+    return x * y * z;
 }
 
 // Returns how much a slab counts by its distance from the hit: 1 where its plane passes through it, 0 where that is an

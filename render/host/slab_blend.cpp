@@ -48,13 +48,13 @@ public:
     /// Returns what is seen of a pixel's hit on a slab leaf, the normal turned to no side. `x`: the hit in leaf space.
     f32::SlabBlend blend(int pixel, glm::vec3 x, float share) {
         const SlabsAtCorner& at = slabsAt(hits_.leaf[pixel], f32::nearestCorner(x));
-        const glm::vec3 own = at.slabs[0].normal;
+        const glm::vec3 own = at.slabs[0].normal, above = f32::shareAbove(x);
         f32::SlabBlend sum{glm::vec3(0), glm::vec4(0), 0};
         for (size_t i = 0; i < at.count; ++i) {
             const NearSlab& slab = at.slabs[i];
             const float nearness =
                 f32::slabNearness(slab.normal, slab.offset, (x - slab.low) * slab.inverseEdge - 0.5f);
-            const float weight = nearness * f32::octantWeight(x, slab.octant) * (i == 0 ? 1.0f : share);
+            const float weight = nearness * f32::octantWeight(above, slab.octant) * (i == 0 ? 1.0f : share);
             sum = f32::withSlab(sum, slab.normal, slab.colour, weight, own);
         }
         return sum;

@@ -225,6 +225,7 @@ SlabBlend blendSlabs(Hit hit, vec3 own, float share) {
     ivec3 apart = below ^ above;
     TreeBox holdsAll = descendTo(rootAbout(hit, below, above), below, findMSB(uint(apart.x | apart.y | apart.z)) + 1);
     uint ownOctant = octantOfLeaf(corner);
+    vec3 shares = shareAbove(x);
     float edge = powerOfTwo(leafBits);
     SlabBlend sum = SlabBlend(vec3(0.0), vec4(0.0), 0.0);
     DONT_UNROLL for (uint octant = 0u; octant < 8u; octant++) {
@@ -239,7 +240,7 @@ SlabBlend blendSlabs(Hit hit, vec3 own, float share) {
             vec3 n = decodeDirection(code >> kSlabDirectionShift);
             vec3 boxLow = vec3((place >> box.bits << box.bits) - low);
             vec3 fromCentre = (x * edge - boxLow) * powerOfTwo(-box.bits) - 0.5;
-            float weight = slabNearness(n, slabOffset(code), fromCentre) * octantWeight(x, octant) *
+            float weight = slabNearness(n, slabOffset(code), fromCentre) * octantWeight(shares, octant) *
                            (octant == ownOctant ? 1.0 : share);
             vec4 colour = vec4(0.0);
             if (kColour != 0u) colour = slabColour(box.word, fetchTableColours(box.record).faces);

@@ -82,17 +82,19 @@ TEST(SlabBlend, WeightsAreThoseOfTheEightOctants) {
         EXPECT_LE(glm::length(corner - x), std::sqrt(0.75));
         double sum = 0, largest = 0;
         for (uint32_t octant = 0; octant < 8; ++octant) {
-            sum += f64::octantWeight(x, octant);
-            largest = std::max(largest, f64::octantWeight(x, octant));
+            sum += f64::octantWeight(f64::shareAbove(x), octant);
+            largest = std::max(largest, f64::octantWeight(f64::shareAbove(x), octant));
         }
         EXPECT_NEAR(sum, 1, 1e-12);
-        EXPECT_EQ(f64::octantWeight(x, f64::octantOfLeaf(corner)), largest) << "the leaf that is hit counts most";
+        EXPECT_EQ(f64::octantWeight(f64::shareAbove(x), f64::octantOfLeaf(corner)), largest)
+            << "the leaf that is hit counts most";
     }
     // In the middle of a leaf it alone counts, at a corner all count alike.
-    EXPECT_EQ(f64::octantWeight(glm::dvec3(0.5), f64::octantOfLeaf(f64::nearestCorner(glm::dvec3(0.5)))), 1);
+    EXPECT_EQ(
+        f64::octantWeight(f64::shareAbove(glm::dvec3(0.5)), f64::octantOfLeaf(f64::nearestCorner(glm::dvec3(0.5)))), 1);
     for (uint32_t octant = 0; octant < 8; ++octant) {
-        EXPECT_EQ(f64::octantWeight(glm::dvec3(0), octant), 0.125);
-        EXPECT_EQ(f64::octantWeight(glm::dvec3(1), octant), 0.125);
+        EXPECT_EQ(f64::octantWeight(f64::shareAbove(glm::dvec3(0)), octant), 0.125);
+        EXPECT_EQ(f64::octantWeight(f64::shareAbove(glm::dvec3(1)), octant), 0.125);
     }
 }
 
