@@ -204,6 +204,15 @@ glm::dvec2 upperLeft(const FrameRequest& request) {
     return glm::dvec2(tile.x, tile.y) + sampleOffset(request.sample);
 }
 
+std::vector<SectionCut> sectionCuts(std::span<const SectionPlane> planes) {
+    std::vector<SectionCut> cuts;
+    for (const SectionPlane& plane : planes) {
+        const double length = glm::length(plane.normal);
+        cuts.emplace_back(plane.normal / length, plane.offset / length);
+    }
+    return cuts;
+}
+
 PictureRays pictureRays(const FrameRequest& request) {
     const PictureTile whole = wholePicture(request);
     PictureRays rays = pictureRays(request.camera, whole.fullWidth, whole.fullHeight);
@@ -211,10 +220,7 @@ PictureRays pictureRays(const FrameRequest& request) {
     rays.origin = rays.originAt(corner.x, corner.y);
     rays.direction = rays.directionAt(corner.x, corner.y);
     rays.size = {int(request.width), int(request.height)};
-    for (const SectionPlane& plane : request.sections) {
-        const double length = glm::length(plane.normal);
-        rays.sections.emplace_back(plane.normal / length, plane.offset / length);
-    }
+    rays.sections = sectionCuts(request.sections);
     return rays;
 }
 

@@ -1,6 +1,9 @@
 // Computes from a request what shaders and selection need: in double, rounded once. Pure.
 #pragma once
 
+#include <span>
+#include <vector>
+
 #include "render/frame_request.h"
 #include "render/frame_result.h"
 #include "render/shared/frame.h"
@@ -39,6 +42,9 @@ PictureTile wholePicture(const FrameRequest& request);
 /// Returns where the upper left corner of the part that a request draws is seen, in pixels of the whole: where the
 /// tile begins, moved by the request's sample.
 glm::dvec2 upperLeft(const FrameRequest& request);
+
+/// Returns planes as rays are clipped by them, with unit normals.
+std::vector<SectionCut> sectionCuts(std::span<const SectionPlane> planes);
 
 /// Returns the rays of the part of a picture that a request draws, with its section planes.
 PictureRays pictureRays(const FrameRequest& request);

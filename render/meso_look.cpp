@@ -28,7 +28,7 @@ uint32_t shownIn(ShadingMode mode) {
 }  // namespace
 
 MesoLook mesoLook(const MesoSurface& surface) {
-    MesoLook look;
+    MesoLook look{.view = plainView(surface), .looks = {}};
     if (surface.far)
         for (const glm::vec4& texel : surface.far->texels) look.looks.push_back(glm::packHalf4x16(texel));
     const auto add = [&](const MesoTexture* texture, frame::MesoImage& where, uint32_t bit) {
@@ -42,19 +42,32 @@ MesoLook mesoLook(const MesoSurface& surface) {
     // A surface that rays may come through must be marched.
     look.isFarDrawn = surface.far && (surface.withBase || surface.far->isOpaque);
     look.view.meanHeight = look.isFarDrawn ? float(surface.far->height) : 0.0f;
-    look.view.nodes = surface.shell.nodes;
-    look.view.withBase = surface.withBase ? 1 : 0;
-    look.view.shadowLift = float(surface.lift);
-    look.view.colour = surface.colour;
     return look;
 }
 
-void setPicture(frame::MesoView& view, glm::dvec3 origin, const FrameRequest& request) {
-    const PictureRays rays = pictureRays(request);
+frame::MesoView plainView(const MesoSurface& surface) {
+    frame::MesoView view{};
+    view.nodes = surface.shell.nodes;
+    view.withBase = surface.withBase ? 1 : 0;
+    view.shadowLift = float(surface.lift);
+    view.colour = surface.colour;
+    return view;
+}
+
+void setRays(frame::MesoView& view, glm::dvec3 origin, const PictureRays& rays) {
     view.eye = toVec4(rays.origin - origin), view.eyeX = toVec4(rays.originPerX), view.eyeY = toVec4(rays.originPerY);
     view.forward = toVec4(rays.direction), view.forwardX = toVec4(rays.directionPerX),
     view.forwardY = toVec4(rays.directionPerY);
-    view.width = request.width, view.height = request.height;
+    view.width = uint32_t(rays.size.x), view.height = uint32_t(rays.size.y);
+    view.sectionCount = uint32_t(rays.sections.size());
+    for (size_t i = 0; i < rays.sections.size(); ++i) {
+        const glm::dvec3 normal(rays.sections[i]);
+        view.sections[i] = glm::dvec4(normal, glm::dot(normal, origin) - rays.sections[i].w);
+    }
+}
+
+void setPicture(frame::MesoView& view, glm::dvec3 origin, const FrameRequest& request) {
+    setRays(view, origin, pictureRays(request));
     const PictureTile whole = wholePicture(request);
     const CameraBasis basis = cameraBasis(request.camera, whole.fullWidth, whole.fullHeight);
     view.lightCount = 0;
@@ -63,11 +76,6 @@ void setPicture(frame::MesoView& view, glm::dvec3 origin, const FrameRequest& re
     view.up = lightDirections(request, basis).sky;
     view.strayPixels = float(request.errorPixels), view.farShadows = request.shading.shadows ? 1 : 0;
     view.shows = shownIn(request.shading.mode);
-    view.sectionCount = uint32_t(request.sections.size());
-    for (size_t i = 0; i < rays.sections.size(); ++i) {
-        const glm::dvec3 normal(rays.sections[i]);
-        view.sections[i] = glm::dvec4(normal, glm::dot(normal, origin) - rays.sections[i].w);
-    }
 }
 
 bool hasMesoShadows(const Shading& shading) { return shading.shadows && shownIn(shading.mode) == frame::kMesoShowLit; }

@@ -20,8 +20,13 @@ struct MesoLook {
     bool isFarDrawn = false;      ///< it is seen from far where it is small
 };
 MesoLook mesoLook(const MesoSurface& surface);
+/// Returns a view of the surface without textures and what is seen from far.
+frame::MesoView plainView(const MesoSurface& surface);
 
-/// Fills what depends on the picture. `origin`: of the surface's space in the world.
+/// Fills the rays of a picture and what they are clipped by. `origin`: of the surface's space in the world.
+void setRays(frame::MesoView& view, glm::dvec3 origin, const PictureRays& rays);
+
+/// Fills all that depends on the picture.
 void setPicture(frame::MesoView& view, glm::dvec3 origin, const FrameRequest& request);
 
 /// Whether rays of light go from and through the surfaces of a picture.

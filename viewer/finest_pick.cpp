@@ -2,10 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <vector>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+
+#include "render/surface_pick.h"
 
 namespace vcp {
 
@@ -121,7 +124,15 @@ Result<std::optional<SceneHit>> ScenePick::cast(const Ray& ray, std::span<const 
         nearest->position = placement.toWorld(nearest->position);
         nearest->normal = placement.rotation * nearest->normal;
     }
-    return nearest;
+    const auto point = pickOnSurfaces(surfaces_, ray.origin, ray.direction, sections);
+    if (!point || (nearest && nearest->t <= point->depth)) return nearest;
+    SceneHit onSurface;
+    onSurface.t = point->depth;
+    onSurface.position = point->position;
+    onSurface.normal = point->normal;
+    onSurface.certifiedError = point->error.value_or(std::numeric_limits<double>::infinity());
+    onSurface.onSurface = true;
+    return onSurface;
 }
 
 }  // namespace vcp

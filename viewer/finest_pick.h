@@ -32,16 +32,21 @@ private:
     PageCache pages_;
 };
 
+/// `certifiedError` of a hit on mesostructure is what is known of its method (mesostructure/known_error.h); infinite
+/// where nothing is.
 struct SceneHit : RayHit {
-    size_t dataset = 0;  ///< number of the dataset, in the order of add()
+    size_t dataset = 0;      ///< number of the dataset, in the order of add()
+    bool onSurface = false;  ///< on mesostructure: only t, position, normal and certifiedError mean something
 };
 
-/// Picks in several datasets, each where it is placed; the nearest hit, in the world.
+/// Picks in several datasets, each where it is placed, and surfaces with mesostructure; the nearest hit, in the world.
 class ScenePick {
 public:
     void add(std::shared_ptr<const ByteReader> reader, const Dataset& dataset, const Similarity& placement) {
         parts_.push_back({FinestPick(std::move(reader), dataset), placement});
     }
+    /// They must outlive all casts.
+    void setSurfaces(std::span<const MesoSurface> surfaces) { surfaces_ = surfaces; }
     /// `hidden`: numbers of datasets that are not there.
     Result<std::optional<SceneHit>> cast(const Ray& ray, std::span<const SectionPlane> sections = {},
                                          std::span<const uint32_t> hidden = {});
@@ -56,6 +61,7 @@ private:
         Similarity placement;
     };
     std::vector<Part> parts_;
+    std::span<const MesoSurface> surfaces_;
 };
 
 }  // namespace vcp

@@ -48,7 +48,14 @@ bool SurfaceCaster::castPixel(glm::ivec2 pixel, SurfaceHit& hit, uint32_t& itera
     const float width = cast.pixelWidth(found.t);
     const ShellLook look = cast.lookOf(found, eye + found.t * d, d, width, n);
     if (glm::dot(n, d) > 0) n -= glm::dot(n, d) * d;
-    hit = {kept.first + found.t, glm::normalize(n), look.colour, width, found.far, look.sky / kMesoMostSky, look.light};
+    hit = {.depth = kept.first + found.t,
+           .normal = glm::normalize(n),
+           .colour = look.colour,
+           .width = width,
+           .piece = found.piece,
+           .isFar = found.far,
+           .sky = look.sky / kMesoMostSky,
+           .light = look.light};
     return true;
 }
 

@@ -31,6 +31,7 @@ struct SurfaceHit {
     glm::vec3 normal{0};
     glm::vec3 colour{0};  ///< encoded for the screen
     float width = 0;      ///< of the pixel there
+    int piece = 0;        ///< of the shell: the first of its texels
     bool isFar = false;   ///< not marched: it stands for many points
     float sky = 1;        ///< of a far hit: the part of the sky that its points face
     glm::vec4 light{1};   ///< of a far hit: what each light gives, at strength 1

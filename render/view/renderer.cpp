@@ -101,6 +101,11 @@ Result<void> Renderer::setSurfaces(std::span<const MesoSurface> surfaces) {
     return left;
 }
 
+std::span<const MesoSurface> Renderer::surfaces() const {
+    const Shared& s = *view_->shared;
+    return s.meso ? std::span<const MesoSurface>(s.meso->surfaces) : std::span<const MesoSurface>();
+}
+
 void Renderer::close() {
     Shared& s = *view_->shared;
     s.hidePool();

@@ -81,6 +81,8 @@ public:
     /// device that is made anew. Without any, nothing is made for them. After an error there are none. Errors: Device,
     /// Limit.
     Result<void> setSurfaces(std::span<const MesoSurface> surfaces) override;
+    /// Returns them, until others are set.
+    [[nodiscard]] std::span<const MesoSurface> surfaces() const;
 
     /// Sets other budgets than the options', from now on: pages without room go at once, and kept pages are not read
     /// again where `ramBytes` has room to carry them over. Waits for the copies. update() must follow. Errors: Usage;

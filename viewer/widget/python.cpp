@@ -155,7 +155,8 @@ py::object pickOf(View& view, double x, double y) {
     }
     if (p.hit == 0) return py::none();
     return py::dict("position"_a = triple(p.position), "normal"_a = triple(p.normal), "distance"_a = p.distance,
-                    "error"_a = p.error, "level"_a = p.level, "dataset"_a = p.dataset);
+                    "error"_a = p.error, "level"_a = p.level,
+                    "dataset"_a = p.dataset == VCP_NO_DATASET ? py::object(py::none()) : py::int_(p.dataset));
 }
 
 /// Returns (height, width, 4) of uint8, and (height, width) of float32.

@@ -408,15 +408,20 @@ typedef struct vcp_host_image {
 /* Copies the last picture into your image, scaled to it; what was in the image is lost. */
 VCP_API vcp_status vcp_view_copy_to_image(vcp_view* view, const vcp_host_image* image);
 
+/* The dataset of a pick on a surface with mesostructure. */
+#define VCP_NO_DATASET 0xFFFFFFFFu
+
 typedef struct vcp_pick {
     uint32_t struct_size;
     uint32_t hit; /* 0: nothing is there, and the rest is zero */
     double position[3];
     double normal[3]; /* unit, towards the eye */
     double distance;  /* from the origin of the eye's ray */
-    double error;     /* certified error: the mesh is at most so far from `position`'s surface */
-    uint32_t level;   /* level of the page that was hit: the finest there is */
-    uint32_t dataset; /* number of the dataset that was hit, in the order in which they were placed */
+    double error;     /* certified error: the mesh is at most so far from `position`'s surface; on mesostructure what is
+                         known of its method, and infinite where nothing is */
+    uint32_t level;   /* level of the page that was hit: the finest there is; 0 on mesostructure */
+    uint32_t
+        dataset; /* number of the dataset that was hit, in the order in which they were placed, or VCP_NO_DATASET */
 } vcp_pick;
 
 /* Finds what is at a point of the picture, on the finest level and in double precision, whatever is drawn. Reads what

@@ -178,7 +178,7 @@ Result<void> pick(vcp_view& view, double x, double y, vcp_pick* out) {
             picked.distance = hit->t;
             picked.error = hit->certifiedError;
             picked.level = hit->level;
-            picked.dataset = uint32_t(hit->dataset);
+            picked.dataset = hit->onSurface ? VCP_NO_DATASET : uint32_t(hit->dataset);
         }
     }
     return give(out, picked);

@@ -40,8 +40,9 @@ std::string textOf(const MeasuredLine& line, size_t number, const std::optional<
     std::string text;
     for (size_t i = 0; i < line.size(); ++i) {
         const MeasuredPoint& p = line[i];
-        text += fmt::format("{}.{}  {}  {}  {}  +-{:.2g} (level {})", number, i + 1, rounded(p.position.x, p.error),
-                            rounded(p.position.y, p.error), rounded(p.position.z, p.error), p.error, p.level);
+        text += fmt::format("{}.{}  {}  {}  {}  +-{:.2g}", number, i + 1, rounded(p.position.x, p.error),
+                            rounded(p.position.y, p.error), rounded(p.position.z, p.error), p.error);
+        if (p.level) text += fmt::format(" (level {})", *p.level);
         if (i > 0)
             text += "\n     distance " + lengthWithError(segmentLength(line, i - 1), segmentError(line, i - 1), unit);
         if (hasAngle(line, i)) text += fmt::format("\n     angle {:.2f} degrees", angleAt(line, i));
@@ -58,8 +59,9 @@ Json toJson(const MeasuredLine& line) {
     Json segments = Json::array(), angles = Json::array();
     for (size_t i = 0; i < line.size(); ++i) {
         const MeasuredPoint& p = line[i];
-        json["points"].push_back(
-            {{"position", {p.position.x, p.position.y, p.position.z}}, {"error", p.error}, {"level", p.level}});
+        Json point = {{"position", {p.position.x, p.position.y, p.position.z}}, {"error", p.error}};
+        if (p.level) point["level"] = *p.level;
+        json["points"].push_back(std::move(point));
         if (i + 1 < line.size()) segments.push_back(segmentLength(line, i));
         if (i > 0 && i + 1 < line.size()) angles.push_back(hasAngle(line, i) ? Json(angleAt(line, i)) : Json(nullptr));
     }
@@ -139,7 +141,7 @@ std::string measurementCsv(const Measurement& measurement) {
         for (size_t i = 0; i < line.size(); ++i) {
             const MeasuredPoint& p = line[i];
             csv += fmt::format("{},{},{:.17g},{:.17g},{:.17g},{:.9g},{},", n + 1, i + 1, p.position.x, p.position.y,
-                               p.position.z, p.error, p.level);
+                               p.position.z, p.error, p.level ? fmt::to_string(*p.level) : "");
             if (i > 0) {
                 total += segmentLength(line, i - 1);
                 csv += fmt::format("{:.17g},{:.9g},{:.17g},", segmentLength(line, i - 1), segmentError(line, i - 1),

@@ -1,7 +1,8 @@
 // Points picked on a surface and what follows from them: distances, polylines, angles; as text, CSV and JSON.
 //
 // World coordinates in double precision, 17 significant digits in files: what is read back is what was measured.
-// Every point knows the certified error of the level it was picked on; a length is off by at most the errors of the
+// Every point knows the certified error of the level it was picked on, or what is known of the method of a surface with
+// mesostructure; a length is off by at most the errors of the
 // points at both ends of each of its segments. Plain data, no threads.
 #pragma once
 
@@ -20,9 +21,9 @@
 namespace vcp {
 
 struct MeasuredPoint {
-    glm::dvec3 position{0};  ///< world
-    double error = 0;        ///< certified error, world units
-    uint32_t level = 0;      ///< level on which it was picked
+    glm::dvec3 position{0};         ///< world
+    double error = 0;               ///< world units
+    std::optional<uint32_t> level;  ///< level on which it was picked; none on mesostructure
 };
 
 using MeasuredLine = std::vector<MeasuredPoint>;

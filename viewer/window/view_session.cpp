@@ -163,6 +163,7 @@ Result<void> ViewSession::show(const OpenedScene& open, const std::vector<std::s
         scans_.push_back({.reader = part.open.reader, .placement = part.placement, .plane = {}, .unit = {}});
     }
     VCP_TRY(viewer_->open(open.placed(), open.surfaces, camera, nameOf(inputs)));
+    finest_->setSurfaces(viewer_->renderer().surfaces());
     viewer_->setLooks(looksOf(open.file));
     if (!open.surfaces.warnings.empty()) note(open.surfaces.warnings.front());
     subject_ = open.legendSubject();
@@ -287,10 +288,6 @@ void ViewSession::pasteCamera(const std::string& json) {
 
 void ViewSession::clickAt(glm::dvec2 pixel) {
     if (!finest_ || pick_.valid() || clicks_ == Clicks::Nothing) return;
-    if (const auto hit = viewer_->hitAt(pixel); hit && hit->onSurface) {
-        if (clicks_ == Clicks::Measure) return note("mesostructure is not measured: it has no certified error");
-        return annotate(hit->position);
-    }
     // A cap is the section plane itself: its points are exact.
     if (const auto cap = viewer_->capAt(pixel)) {
         if (clicks_ == Clicks::Annotate) return annotate(*cap);
@@ -310,7 +307,11 @@ void ViewSession::takePicked() {
     if (!picked) return say(picked.error().line());
     if (!*picked) return note("there is no surface under the cursor");
     if (pickedFor_ == Clicks::Annotate) return annotate((*picked)->position);
-    measurement_.add({(*picked)->position, (*picked)->certifiedError, (*picked)->level});
+    const SceneHit& hit = **picked;
+    if (!hit.onSurface) return measurement_.add({hit.position, hit.certifiedError, hit.level});
+    if (!std::isfinite(hit.certifiedError))
+        return note("not measured: nothing is known of the error of this surface's method (see docs/mesostructure.md)");
+    measurement_.add({hit.position, hit.certifiedError, {}});
 }
 
 void ViewSession::annotate(glm::dvec3 position) {

@@ -1,0 +1,59 @@
+#include "render/surface_pick.h"
+
+#include <cmath>
+#include <limits>
+
+#include <glm/geometric.hpp>
+#include <glm/mat3x3.hpp>
+#include <glm/matrix.hpp>
+
+#include "mesostructure/known_error.h"
+#include "render/frame_setup.h"
+#include "render/host/surface_caster.h"
+#include "render/meso_look.h"
+
+namespace vcp {
+
+namespace {
+
+// What single precision takes from a hit, in parts of its depth and of the shell's size: more than ten roundings.
+constexpr double kRounding = 1e-6;
+
+/// Returns how many world units one unit of the tile is at most, in a piece of the shell.
+double stretchOf(const meso::Shell& shell, int piece) {
+    const auto row = [&](int i) { return glm::dvec3(shell.texels[size_t(piece + 4 + i)]); };
+    const glm::dmat3 worldFromTile = glm::inverse(glm::transpose(glm::dmat3(row(0), row(1), row(2))));
+    double sum = 0;
+    for (int i = 0; i < 3; ++i) sum += glm::dot(worldFromTile[i], worldFromTile[i]);
+    return std::sqrt(sum);
+}
+
+std::optional<double> errorAt(const MesoSurface& surface, const SurfaceHit& hit) {
+    const auto known = knownError(*surface.arrays);
+    if (!known) return {};
+    const meso::Shell& shell = surface.shell;
+    return *known * stretchOf(shell, hit.piece) +
+           kRounding * (double(hit.depth) + glm::distance(shell.low, shell.high));
+}
+
+}  // namespace
+
+std::optional<SurfacePoint> pickOnSurfaces(std::span<const MesoSurface> surfaces, glm::dvec3 origin,
+                                           glm::dvec3 direction, std::span<const SectionPlane> sections) {
+    std::optional<SurfacePoint> nearest;
+    const PictureRays rays{.origin = origin, .direction = direction, .size = {1, 1}, .sections = sectionCuts(sections)};
+    SurfaceHit hit;
+    hit.depth = std::numeric_limits<float>::infinity();
+    for (const MesoSurface& surface : surfaces) {
+        if (!surface.arrays) continue;
+        HostSurface cast{*surface.arrays, surface.shell, plainView(surface), {}, 0, false};
+        setRays(cast.view, surface.shell.origin, rays);
+        uint32_t iterations = 0;
+        SurfaceWork work;
+        if (SurfaceCaster(cast).castPixel({0, 0}, hit, iterations, work))
+            nearest = {origin + double(hit.depth) * direction, hit.normal, double(hit.depth), errorAt(surface, hit)};
+    }
+    return nearest;
+}
+
+}  // namespace vcp
