@@ -132,7 +132,7 @@ Result<std::optional<SceneHit>> ScenePick::cast(const Ray& ray, std::span<const 
     onSurface.normal = point->normal;
     onSurface.certifiedError = point->error.value_or(std::numeric_limits<double>::infinity());
     onSurface.onSurface = true;
-    return onSurface;
+    return std::optional(onSurface);
 }
 
 }  // namespace vcp
