@@ -5,6 +5,7 @@
 
 #include <glm/geometric.hpp>
 
+#include "octree/reference_caster.h"
 #include "tests/support/meso_surfaces.h"
 
 namespace vcp {
