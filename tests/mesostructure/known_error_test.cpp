@@ -77,7 +77,7 @@ TEST(KnownError, HitsInCellsOfSolidsAreNoFartherThanAcrossACell) {
         const Found found = hitsOf(*method, asset.extent, [&](glm::dvec3 at) { return (*shape)->distance(at, 1); });
         EXPECT_GT(found.hits, 500);
         EXPECT_LE(found.worst, *known);
-        if (name == "boxes") {
+        if (name == "ddm") {
             EXPECT_GT(found.worst, *known / 4) << "a wall of a cell is hit";
         }
     }

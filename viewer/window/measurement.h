@@ -21,9 +21,9 @@
 namespace vcp {
 
 struct MeasuredPoint {
-    glm::dvec3 position{0};         ///< world
-    double error = 0;               ///< world units
-    std::optional<uint32_t> level;  ///< level on which it was picked; none on mesostructure
+    glm::dvec3 position{0};              ///< world
+    double error = 0;                    ///< world units
+    std::optional<uint32_t> level = {};  ///< level on which it was picked; none on mesostructure
 };
 
 using MeasuredLine = std::vector<MeasuredPoint>;
