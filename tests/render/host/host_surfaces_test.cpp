@@ -108,7 +108,7 @@ TEST_F(HostSurfaces, ModesSectionsLightsTexturesAndFar) {
     MesoSurface textured = mesoSurface(relief(), "pyramid", "sphere", 0.2);
     textured.colours = std::make_shared<const MesoTexture>(makeMesoTexture({16, 16}, colours));
     textured.normals = std::make_shared<const MesoTexture>(makeMesoTexture({16, 16}, normals));
-    MesoSurface small = mesoSurface(relief(), "boxes", "quad", 0.02, 200, {0.5, 0.3, -0.2});
+    MesoSurface small = mesoSurface(relief(), "boxes", "quad", 0.004, 200, {0.5, 0.3, -0.2});
     small.far = std::make_shared<const meso::Appearance>(appearanceOf(**shapeOf(relief()), 0.5, 64));
     setSurfaces({textured, small});
     const auto compared = [&](const auto& change, uint32_t samples = 1) {
@@ -301,7 +301,9 @@ TEST_F(HostSurfaces, ScanAndReliefCastShadowsOnEachOther) {
                   {.eye = {2.4, -2.2, 0.1}, .forward = glm::normalize(glm::dvec3(-1.6, 2.2, 0.5)), .up = {0, 0, 1}},
                   {0.75f, -0.1f, -1.0f}}};
     for (const auto& [truth, camera, light] : cases) {
-        const std::vector<MesoSurface> surfaces{mesoSurface(plateau(), "boxes", "quad", 0.5)};
+        std::vector<MesoSurface> surfaces{mesoSurface(plateau(), "boxes", "quad", 0.5)};
+        // Where shadow rays start is not part of the closed forms, and its texels are wide.
+        surfaces[0].lift = 1e-3;
         ASSERT_TRUE(host_->open({{scene.dataset, scene.source, truth.placement()}}, surfaces));
         FrameRequest request = lookFrom(camera);
         request.width = 400, request.height = 300;
@@ -312,7 +314,7 @@ TEST_F(HostSurfaces, ScanAndReliefCastShadowsOnEachOther) {
         const ShadowCounts counts = countShadows(truth, request, lit, shadowed);
         EXPECT_EQ(counts.wrong, 0u);
         const bool fromAbove = light.z > 0;
-        EXPECT_GT(fromAbove ? counts.onSlab[1] : counts.onBall[1], 1000u);
+        EXPECT_GT(fromAbove ? counts.onSlab[1] : counts.onBall[1], 900u);
         EXPECT_GT(counts.onBall[0], 1000u);
         EXPECT_LT(counts.doubtful, 12000u);
     }
