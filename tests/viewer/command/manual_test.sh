@@ -71,7 +71,7 @@ offers() {
     got=$(offered "$@")
     [ "$got" = "$expected" ] || fail "after \"$*\" bash offers \"$got\", not \"$expected\""
 }
-offers build vcp bui
+offers $'build\nbuild-plan\nbuild-step' vcp bui
 offers $'certified\npaper' vcp build --method ''
 offers paper vcp build x.ply --method p
 offers paper vcp build --method = p
