@@ -19,6 +19,20 @@
 
 namespace vcp::test {
 
+/// Returns a cut of several levels: every second page is replaced by its children, down to the finest level.
+inline std::vector<uint64_t> mixedCut(const Dataset& dataset) {
+    std::vector<uint64_t> cut, open = {0};
+    for (size_t i = 0; i < open.size(); ++i) {
+        const PageEntry& page = dataset.pages[open[i]];
+        if (page.childMask == 0 || (i % 2 == 1 && page.level > 0)) {
+            cut.push_back(open[i]);
+            continue;
+        }
+        for (const uint64_t child : childrenOf(page)) open.push_back(child);
+    }
+    return cut;
+}
+
 /// Pages of a dataset, from memory; pages in `broken` cannot be read.
 class MemorySource final : public PageSource {
 public:

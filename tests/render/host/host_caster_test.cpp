@@ -216,20 +216,6 @@ TEST(HostCaster, TrianglesInWallsOfTheGrid) {
     }
 }
 
-/// Every second page is replaced by its children, down to the finest level.
-std::vector<uint64_t> mixedCut(const Dataset& dataset) {
-    std::vector<uint64_t> cut, open = {0};
-    for (size_t i = 0; i < open.size(); ++i) {
-        const PageEntry& page = dataset.pages[open[i]];
-        if (page.childMask == 0 || (i % 2 == 1 && page.level > 0)) {
-            cut.push_back(open[i]);
-            continue;
-        }
-        for (const uint64_t child : childrenOf(page)) open.push_back(child);
-    }
-    return cut;
-}
-
 TEST(HostCaster, BuiltMeshOnEveryLevelAndInAMixedCut) {
     IndexedMesh mesh = test::torusMesh({0.1, 0.2, 0.3}, 1, 0.4, 90, 45);
     test::append(mesh, test::boxMesh({-0.3, -0.3, -0.3}, {0.35, 0.25, 0.3}, 4));
@@ -241,7 +227,7 @@ TEST(HostCaster, BuiltMeshOnEveryLevelAndInAMixedCut) {
         SCOPED_TRACE(level);
         expectSame(built.cache(), cutAtLevel(dataset, level), {-1.4, -1.3, -1.2}, {1.6, 1.7, 1.8});
     }
-    expectSame(built.cache(), mixedCut(dataset), {-1.4, -1.3, -1.2}, {1.6, 1.7, 1.8});
+    expectSame(built.cache(), test::mixedCut(dataset), {-1.4, -1.3, -1.2}, {1.6, 1.7, 1.8});
 }
 
 TEST(HostCaster, SectionsOfEveryKindOfLeaf) {

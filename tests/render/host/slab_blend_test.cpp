@@ -23,20 +23,6 @@ test::AnalyticDataset slabSphere() {
     return test::analyticDataset(test::sphere(kCentre, kRadius), o);
 }
 
-/// Every second page is replaced by its children, down to the finest level.
-std::vector<uint64_t> mixedCut(const Dataset& dataset) {
-    std::vector<uint64_t> cut, open = {0};
-    for (size_t i = 0; i < open.size(); ++i) {
-        const PageEntry& page = dataset.pages[open[i]];
-        if (page.childMask == 0 || (i % 2 == 1 && page.level > 0)) {
-            cut.push_back(open[i]);
-            continue;
-        }
-        for (const uint64_t child : childrenOf(page)) open.push_back(child);
-    }
-    return cut;
-}
-
 /// Calls visit(hits, element, ray) for each hit of a picture, its slabs blended.
 template <class Visit>
 void forEachHit(const HostScene& scene, const Camera& camera, const CastOptions& pixels, const Visit& visit) {
@@ -95,7 +81,7 @@ TEST(HostSlabBlend, EveryCameraAgreesWithTheReference) {
     const Dataset& dataset = *scene.dataset;
     uint64_t hits = 0, blended = 0, otherNormals = 0;
     for (const auto& cut :
-         {cutAtLevel(dataset, 0), cutAtLevel(dataset, 1), cutAtLevel(dataset, 2), mixedCut(dataset)}) {
+         {cutAtLevel(dataset, 0), cutAtLevel(dataset, 1), cutAtLevel(dataset, 2), test::mixedCut(dataset)}) {
         SCOPED_TRACE(cut.size());
         for (const test::NamedCamera& named : test::cameras(scene)) {
             SCOPED_TRACE(named.name);
