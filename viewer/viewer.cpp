@@ -465,7 +465,8 @@ bool Viewer::isMoving(double now) const { return now - movedAt_ < kRestSeconds; 
 
 int Viewer::reductionAt(double now) const {
     if (options_.movingFrameMs <= 0 || !isMoving(now)) return 1;
-    if (fullFrameMs_ <= options_.movingFrameMs) return movingReduction_;
+    // A view that holds still for a moment is not drawn again, coarser, because its picture took long.
+    if (now > movedAt_ || fullFrameMs_ <= options_.movingFrameMs) return movingReduction_;
     const int wanted =
         int(std::min<double>(std::ceil(std::sqrt(fullFrameMs_ / options_.movingFrameMs)), kLargestReduction));
     return std::max(wanted, movingReduction_);

@@ -596,6 +596,20 @@ TEST_F(ViewerTest, LowerResolutionWhileMovingThenFull) {
     EXPECT_TRUE(std::isinf(next_.waitSeconds));
 }
 
+TEST_F(ViewerTest, AViewThatHoldsStillIsNotMadeCoarser) {
+    openViewer(1e-6);
+    while (viewer_->framesDrawn() == 0) turn(0.5);  // the first frame says nothing of the next
+    viewer_->press(MouseButton::Left, {160, 120});
+    viewer_->move({165, 120});
+    ASSERT_TRUE(turn(0.01));
+    EXPECT_EQ(viewer_->status().reduction, 1);
+    for (int i = 0; i < 10; ++i) turn(0.01);
+    EXPECT_EQ(viewer_->status().reduction, 1);
+    viewer_->move({170, 120});
+    ASSERT_TRUE(turn(0.01));
+    EXPECT_EQ(viewer_->status().reduction, 8) << "the next movement knows what the last frame took";
+}
+
 TEST_F(ViewerTest, BrokenPageIsSaidAndTheRestIsShown) {
     const auto file = *folder_ / "broken.vcp";
     std::filesystem::copy_file(*folder_ / "ball.vcp", file, std::filesystem::copy_options::overwrite_existing);
