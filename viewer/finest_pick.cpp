@@ -8,8 +8,6 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
-#include "render/surface_pick.h"
-
 namespace vcp {
 
 namespace {
@@ -100,8 +98,17 @@ Result<std::optional<RayHit>> FinestPick::cast(Ray ray, std::span<const SectionP
 }
 
 Result<std::optional<SceneHit>> ScenePick::cast(const Ray& ray, std::span<const SectionPlane> sections,
-                                                std::span<const uint32_t> hidden) {
+                                                std::span<const uint32_t> hidden,
+                                                const std::optional<SurfacePoint>& onSurface) {
     std::optional<SceneHit> nearest;
+    if (onSurface) {
+        nearest.emplace();
+        nearest->t = onSurface->depth;
+        nearest->position = onSurface->position;
+        nearest->normal = onSurface->normal;
+        nearest->certifiedError = onSurface->error.value_or(std::numeric_limits<double>::infinity());
+        nearest->onSurface = true;
+    }
     for (Part& part : parts_) {
         const auto number = size_t(&part - parts_.data());
         if (std::find(hidden.begin(), hidden.end(), number) != hidden.end()) continue;
@@ -124,15 +131,7 @@ Result<std::optional<SceneHit>> ScenePick::cast(const Ray& ray, std::span<const 
         nearest->position = placement.toWorld(nearest->position);
         nearest->normal = placement.rotation * nearest->normal;
     }
-    const auto point = pickOnSurfaces(surfaces_, ray.origin, ray.direction, sections);
-    if (!point || (nearest && nearest->t <= point->depth)) return nearest;
-    SceneHit onSurface;
-    onSurface.t = point->depth;
-    onSurface.position = point->position;
-    onSurface.normal = point->normal;
-    onSurface.certifiedError = point->error.value_or(std::numeric_limits<double>::infinity());
-    onSurface.onSurface = true;
-    return std::optional(onSurface);
+    return nearest;
 }
 
 }  // namespace vcp

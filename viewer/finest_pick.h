@@ -10,6 +10,7 @@
 
 #include "octree/io/result.h"
 #include "octree/reference_caster.h"
+#include "render/surface_pick.h"
 #include "render/view/renderer.h"
 
 namespace vcp {
@@ -39,17 +40,16 @@ struct SceneHit : RayHit {
     bool onSurface = false;  ///< on mesostructure: only t, position, normal and certifiedError mean something
 };
 
-/// Picks in several datasets, each where it is placed, and surfaces with mesostructure; the nearest hit, in the world.
+/// Picks in several datasets, each where it is placed; the nearest hit, in the world.
 class ScenePick {
 public:
     void add(std::shared_ptr<const ByteReader> reader, const Dataset& dataset, const Similarity& placement) {
         parts_.push_back({FinestPick(std::move(reader), dataset), placement});
     }
-    /// They must outlive all casts.
-    void setSurfaces(std::span<const MesoSurface> surfaces) { surfaces_ = surfaces; }
-    /// `hidden`: numbers of datasets that are not there.
+    /// `hidden`: numbers of datasets that are not there. `onSurface`: what pickOnSurfaces says of this ray.
     Result<std::optional<SceneHit>> cast(const Ray& ray, std::span<const SectionPlane> sections = {},
-                                         std::span<const uint32_t> hidden = {});
+                                         std::span<const uint32_t> hidden = {},
+                                         const std::optional<SurfacePoint>& onSurface = {});
     /// Interrupts the pick of each dataset. The read that is under way ends; another may follow.
     void interrupt() const {
         for (const Part& part : parts_) part.pick.interrupt();
@@ -61,7 +61,6 @@ private:
         Similarity placement;
     };
     std::vector<Part> parts_;
-    std::span<const MesoSurface> surfaces_;
 };
 
 }  // namespace vcp

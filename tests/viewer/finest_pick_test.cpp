@@ -86,22 +86,25 @@ TEST_F(FinestPickTest, TheNearestOfDatasetsAndSurfacesWithMesostructure) {
     scene.add(openFile(*folder_ / "ball.vcp").value(), dataset_, {});
     const std::vector<MesoSurface> surfaces = {
         test::mesoSurface(test::plateau(), "pyramid", "quad", 0.1, 2, {0, 0, -1.5})};
-    scene.setSurfaces(surfaces);
-    const auto ball = scene.cast({{0.1, 0.1, 4}, {0, 0, -1}});
+    const auto cast = [&](const Ray& ray, std::span<const SectionPlane> sections = {},
+                          std::span<const uint32_t> hidden = {}) {
+        return scene.cast(ray, sections, hidden, pickOnSurfaces(surfaces, ray.origin, ray.direction, sections));
+    };
+    const auto ball = cast({{0.1, 0.1, 4}, {0, 0, -1}});
     ASSERT_TRUE(ball && *ball);
     EXPECT_FALSE((*ball)->onSurface);
     EXPECT_GT((*ball)->position.z, 0.5);
-    const auto behind = scene.cast({{0.1, 0.1, -4}, {0, 0, 1}});
+    const auto behind = cast({{0.1, 0.1, -4}, {0, 0, 1}});
     ASSERT_TRUE(behind && *behind);
     EXPECT_TRUE((*behind)->onSurface);
     EXPECT_NEAR((*behind)->position.z, -1.5, 1e-5) << "the base from below";
     EXPECT_LT((*behind)->certifiedError, 1e-3);
     const SectionPlane keepsUpper{{0, 0, 1}, 0};
-    const auto inside = scene.cast({{0.1, 0.1, -4}, {0, 0, 1}}, std::span(&keepsUpper, 1));
+    const auto inside = cast({{0.1, 0.1, -4}, {0, 0, 1}}, std::span(&keepsUpper, 1));
     ASSERT_TRUE(inside && *inside);
     EXPECT_FALSE((*inside)->onSurface);
     const uint32_t hidden = 0;
-    const auto through = scene.cast({{0.1, 0.1, 4}, {0, 0, -1}}, {}, std::span(&hidden, 1));
+    const auto through = cast({{0.1, 0.1, 4}, {0, 0, -1}}, {}, std::span(&hidden, 1));
     ASSERT_TRUE(through && *through);
     EXPECT_NEAR((*through)->position.z, -1.44, 1e-5);
 }

@@ -84,7 +84,6 @@ Result<void> show(vcp_context& context, OpenedScene open, const std::string& nam
     context.open = std::move(open);
     context.name = std::filesystem::path(shownAddress(name)).filename().string();
     context.finest = std::make_unique<ScenePick>();
-    context.finest->setSurfaces(context.renderer->surfaces());
     for (const OpenedScene::Part& part : context.open->parts) {
         context.finest->add(part.open.reader, *part.open.dataset, part.placement);
         const FileHeader& header = part.open.dataset->header;

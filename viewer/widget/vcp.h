@@ -420,12 +420,12 @@ typedef struct vcp_pick {
     double error;     /* certified error: the mesh is at most so far from `position`'s surface; on mesostructure what is
                          known of its method, and infinite where nothing is */
     uint32_t level;   /* level of the page that was hit: the finest there is; 0 on mesostructure */
-    uint32_t
-        dataset; /* number of the dataset that was hit, in the order in which they were placed, or VCP_NO_DATASET */
+    /* Number of the dataset that was hit, in the order in which they were placed, or VCP_NO_DATASET. */
+    uint32_t dataset;
 } vcp_pick;
 
 /* Finds what is at a point of the picture, on the finest level and in double precision, whatever is drawn. Reads what
- * it needs from the file or the server, so it may wait. */
+ * it needs from the file or the server, so it may wait. Remeshed surfaces are not found. */
 VCP_API vcp_status vcp_view_pick(vcp_view* view, double x, double y, vcp_pick* pick);
 
 /* Statistics of the last update and the last picture. */

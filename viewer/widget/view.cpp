@@ -170,8 +170,12 @@ Result<void> pick(vcp_view& view, double x, double y, vcp_pick* out) {
     vcp_pick picked{};
     if (x >= 0 && y >= 0 && x < size.x && y < size.y) {
         const CameraRay through = view.viewer->camera().rayThrough({x, y}, size);
-        VCP_TRY_ASSIGN(const auto hit, view.context->finest->cast({through.origin, through.direction},
-                                                                  view.viewer->sections(), view.viewer->hidden()));
+        const Ray ray{through.origin, through.direction};
+        const std::vector<SectionPlane>& sections = view.viewer->sections();
+        const auto surfaces = view.viewer->renderer().surfaces();
+        VCP_TRY_ASSIGN(const auto hit,
+                       view.context->finest->cast(ray, sections, view.viewer->hidden(),
+                                                  pickOnSurfaces(surfaces, ray.origin, ray.direction, sections)));
         if (hit) {
             picked.hit = 1;
             for (int i = 0; i < 3; ++i) picked.position[i] = hit->position[i], picked.normal[i] = hit->normal[i];

@@ -2,8 +2,8 @@
 //
 // World coordinates in double precision, 17 significant digits in files: what is read back is what was measured.
 // Every point knows the certified error of the level it was picked on, or what is known of the method of a surface with
-// mesostructure; a length is off by at most the errors of the
-// points at both ends of each of its segments. Plain data, no threads.
+// mesostructure; a length is off by at most the errors of the points at both ends of each of its segments. Plain data,
+// no threads.
 #pragma once
 
 #include <cstdint>

@@ -24,6 +24,8 @@ namespace {
 constexpr double kOpeningPollSeconds = 0.1;
 constexpr double kPickPollSeconds = 0.01;
 constexpr double kNoteSeconds = 8;
+constexpr const char* kErrorUnknown =
+    "not measured: nothing is known of the error of this surface's method (see docs/mesostructure.md)";
 
 constexpr int kMostExports = 10000;
 constexpr uint32_t kSavedTile = 512;  // small, so that the window stays live between tiles
@@ -163,7 +165,6 @@ Result<void> ViewSession::show(const OpenedScene& open, const std::vector<std::s
         scans_.push_back({.reader = part.open.reader, .placement = part.placement, .plane = {}, .unit = {}});
     }
     VCP_TRY(viewer_->open(open.placed(), open.surfaces, camera, nameOf(inputs)));
-    finest_->setSurfaces(viewer_->renderer().surfaces());
     viewer_->setLooks(looksOf(open.file));
     if (!open.surfaces.warnings.empty()) note(open.surfaces.warnings.front());
     subject_ = open.legendSubject();
@@ -288,6 +289,13 @@ void ViewSession::pasteCamera(const std::string& json) {
 
 void ViewSession::clickAt(glm::dvec2 pixel) {
     if (!finest_ || pick_.valid() || clicks_ == Clicks::Nothing) return;
+    const auto surfaces = viewer_->renderer().surfaces();
+    if (const auto seen = viewer_->hitAt(pixel); seen && seen->onSurface) {
+        if (clicks_ == Clicks::Annotate) return annotate(seen->position);
+        // It may be the one that is seen, and rays do not find it.
+        const auto isRemeshed = [](const MesoSurface& surface) { return !surface.arrays; };
+        if (std::any_of(surfaces.begin(), surfaces.end(), isRemeshed)) return note(kErrorUnknown);
+    }
     // A cap is the section plane itself: its points are exact.
     if (const auto cap = viewer_->capAt(pixel)) {
         if (clicks_ == Clicks::Annotate) return annotate(*cap);
@@ -297,8 +305,11 @@ void ViewSession::clickAt(glm::dvec2 pixel) {
     const CameraRay through = viewer_->camera().rayThrough(pixel, viewer_->size());
     const Ray ray{through.origin, through.direction};
     pickedFor_ = clicks_;
-    pick_ = std::async(std::launch::async,
-                       [finest = finest_, ray, sections = viewer_->sections()] { return finest->cast(ray, sections); });
+    const std::vector<SectionPlane> sections = viewer_->sections();
+    pick_ = std::async(std::launch::async, [finest = finest_, ray, sections, hidden = viewer_->hidden(),
+                                            onSurface = pickOnSurfaces(surfaces, ray.origin, ray.direction, sections)] {
+        return finest->cast(ray, sections, hidden, onSurface);
+    });
 }
 
 void ViewSession::takePicked() {
@@ -309,8 +320,7 @@ void ViewSession::takePicked() {
     if (pickedFor_ == Clicks::Annotate) return annotate((*picked)->position);
     const SceneHit& hit = **picked;
     if (!hit.onSurface) return measurement_.add({hit.position, hit.certifiedError, hit.level});
-    if (!std::isfinite(hit.certifiedError))
-        return note("not measured: nothing is known of the error of this surface's method (see docs/mesostructure.md)");
+    if (!std::isfinite(hit.certifiedError)) return note(kErrorUnknown);
     measurement_.add({hit.position, hit.certifiedError, {}});
 }
 
