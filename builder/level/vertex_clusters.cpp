@@ -8,6 +8,7 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
+#include "builder/stream/colour_encoding.h"
 #include "octree/surface/leaf_math.h"
 #include "octree/surface/morton.h"
 #include "octree/surface/packing.h"
@@ -294,12 +295,9 @@ private:
     }
 
     uint32_t meanColour(Members members) const {
-        uint64_t channel[4] = {};
-        for (const Member& m : members)
-            for (int c = 0; c < 4; ++c) channel[c] += mesh_.colours[m.vertex] >> 8 * c & 255u;
-        uint32_t colour = 0;
-        for (int c = 0; c < 4; ++c) colour |= uint32_t((channel[c] + members.size() / 2) / members.size()) << 8 * c;
-        return colour;
+        LightMean light;
+        for (const Member& m : members) light.add(mesh_.colours[m.vertex]);
+        return light.mean();
     }
 
     uint32_t meanNormal(Members members) const {

@@ -6,7 +6,8 @@
 
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
-#include <glm/packing.hpp>
+
+#include "builder/stream/colour_encoding.h"
 
 namespace vcp {
 
@@ -93,7 +94,7 @@ CellSurface foldEighths(std::span<const CellSurface> eighths, std::span<const ui
         cell.upper = glm::max(cell.upper, centre + e.upper / 2.0f);
         cell.area += e.area / 4;
         for (size_t k = 0; k < 6; ++k) cell.moment[k] += e.moment[k] / 4;
-        cell.colour += e.colour / 4.0f;
+        cell.light += e.light / 4.0f;
     }
     chooseAxis(cell);
     const Extent extent = extentAlong(eighths, octants, glm::dvec3(cell.axis));
@@ -110,7 +111,9 @@ double normalSpread(const CellSurface& cell) {
 }
 
 uint32_t meanColour(const CellSurface& cell) {
-    return glm::packUnorm4x8(cell.area > 0 ? cell.colour / cell.area : glm::vec4(1));
+    if (!(cell.area > 0)) return 0xffffffffu;
+    const glm::dvec4 mean = glm::dvec4(cell.light) / double(cell.area);
+    return packRgba({byteOfLight(mean.r), byteOfLight(mean.g), byteOfLight(mean.b), toByte(mean.a)});
 }
 
 }  // namespace vcp

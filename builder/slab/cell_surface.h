@@ -21,7 +21,7 @@ struct CellSurface {
     float first = 0, last = 0;      ///< the surface is between these along the axis
     float area = 0;                 ///< in squares of the edge
     std::array<float, 6> moment{};  ///< sums of area n n^T over the surface's normals n: xx, yy, zz, yz, zx, xy
-    glm::vec4 colour{0};            ///< sum of area * RGBA
+    glm::vec4 light{0};             ///< sum of area * (linear RGB, alpha)
 };
 
 /// The values between which something lies.
@@ -49,7 +49,7 @@ void chooseAxis(CellSurface& cell);
 /// Returns how far the normals are from the axis: the mean of their squared sines, 0 to 2/3.
 double normalSpread(const CellSurface& cell);
 
-/// Returns the mean colour as RGBA8; white where the surface has no area.
+/// Returns the mean light as a stored colour; white where the surface has no area.
 uint32_t meanColour(const CellSurface& cell);
 
 }  // namespace vcp

@@ -10,6 +10,7 @@
 #include <glm/geometric.hpp>
 #include <glm/gtc/type_precision.hpp>
 
+#include "builder/stream/colour_encoding.h"
 #include "octree/surface/leaf_math.h"
 #include "octree/surface/morton.h"
 
@@ -49,11 +50,36 @@ glm::dvec3 TriangleCutter::Source::weightsAt(glm::dvec3 p) const {
     return {1 - b - c, b, c};
 }
 
-glm::vec4 TriangleCutter::colourAt(glm::dvec3 weights) const {
-    // White is white, but for what rounding makes of the weights.
-    if (mesh_.colours.empty()) return glm::vec4(float(weights.x + weights.y + weights.z));
-    const auto& colour = source_.colour;
-    return glm::vec4(weights.x * colour[0] + weights.y * colour[1] + weights.z * colour[2]);
+namespace {
+
+glm::dvec4 lightOfColour(const glm::dvec4& stored) {
+    return {lightOfStored(stored.r), lightOfStored(stored.g), lightOfStored(stored.b), stored.a};
+}
+
+}  // namespace
+
+// Pictures blend stored colours over a triangle and take their light. A fan is summed up by the middles of its
+// triangles' edges, which is exact for quadratics: of light that goes from black to white within a piece, it errs by a
+// few hundredths.
+glm::vec4 TriangleCutter::lightOf(const Polygon& piece) const {
+    if (mesh_.colours.empty()) return glm::vec4(1);
+    if (source_.isPlain) return glm::vec4(lightOfColour(source_.colour[0]));
+    const auto storedAt = [&](const glm::dvec3& p) {
+        const glm::dvec3 w = source_.weightsAt(p);
+        return w.x * source_.colour[0] + w.y * source_.colour[1] + w.z * source_.colour[2];
+    };
+    const glm::dvec4 first = storedAt(piece[0]);
+    glm::dvec4 before = storedAt(piece[1]), sum(0);
+    double area = 0;
+    for (size_t i = 2; i < piece.size(); ++i) {
+        const glm::dvec4 after = storedAt(piece[i]);
+        const double share = glm::length(glm::cross(piece[i - 1] - piece[0], piece[i] - piece[0]));
+        sum += share * (lightOfColour((first + before) / 2.0) + lightOfColour((before + after) / 2.0) +
+                        lightOfColour((after + first) / 2.0));
+        area += share;
+        before = after;
+    }
+    return glm::vec4(sum / (3 * area));
 }
 
 TriangleCutter::Source TriangleCutter::sourceOf(uint32_t triangle) const {
@@ -71,6 +97,7 @@ TriangleCutter::Source TriangleCutter::sourceOf(uint32_t triangle) const {
     if (mesh_.colours.empty()) return source;
     for (size_t i = 0; i < 3; ++i)
         for (int k = 0; k < 4; ++k) source.colour[i][k] = double(mesh_.colours[t[i]] >> 8 * k & 255u) / 255;
+    source.isPlain = mesh_.colours[t[0]] == mesh_.colours[t[1]] && mesh_.colours[t[0]] == mesh_.colours[t[2]];
     return source;
 }
 
@@ -199,7 +226,7 @@ void TriangleCutter::keep(const Polygon& piece, glm::ivec3 cell) {
     kept.count = uint32_t(piece.size());
     kept.area = float(size / 2);
     kept.normal = glm::vec3(length > 0 ? normal / length : n[0]);
-    kept.colour = colourAt(w);
+    kept.light = lightOf(piece);
     const glm::dvec3 centre = glm::dvec3(cell) + 0.5;
     for (const glm::dvec3& p : piece) corners_.emplace_back(p - centre);
 }
@@ -214,7 +241,7 @@ CellSurface TriangleCutter::sum(std::span<const uint64_t> pieces) const {
         const float products[6] = {n.x * n.x, n.y * n.y, n.z * n.z, n.y * n.z, n.z * n.x, n.x * n.y};
         for (size_t k = 0; k < 6; ++k) cell.moment[k] += piece.area * products[k];
         cell.area += piece.area;
-        cell.colour += piece.area * piece.colour;
+        cell.light += piece.area * piece.light;
     }
     chooseAxis(cell);
     double first = 2, last = -2;

@@ -43,7 +43,8 @@ private:
         Triangle3 corners;
         glm::dvec3 secondGrows{0}, thirdGrows{0};  ///< gradients of these corners' weights
         std::array<glm::dvec3, 3> normal;
-        std::array<glm::dvec4, 3> colour;  ///< where the mesh has colours
+        std::array<glm::dvec4, 3> colour;  ///< as stored, 0 to 1, where the mesh has colours
+        bool isPlain = true;               ///< all of it has the first corner's colour
         /// Returns the weights of the corners at a point of the triangle.
         [[nodiscard]] glm::dvec3 weightsAt(glm::dvec3 p) const;
     };
@@ -66,7 +67,7 @@ private:
         uint32_t code, first, count;  ///< the cell; the corners
         float area;
         glm::vec3 normal;  ///< unit
-        glm::vec4 colour;
+        glm::vec4 light;   ///< mean: linear RGB, alpha
     };
     /// Whether a triangle's bounds reach the box.
     [[nodiscard]] bool mayReach(uint32_t triangle) const;
@@ -80,8 +81,8 @@ private:
     /// Whether a box and the one that pieces are kept of have cells in common.
     [[nodiscard]] bool isWanted(const CutterBox& box) const;
     void keep(const Polygon& piece, glm::ivec3 cell);
-    /// Returns the colour at a point of the triangle that is being cut.
-    [[nodiscard]] glm::vec4 colourAt(glm::dvec3 weights) const;
+    /// Returns the mean light of a piece of the triangle that is being cut, and its mean alpha.
+    [[nodiscard]] glm::vec4 lightOf(const Polygon& piece) const;
     /// `pieces`: their numbers in the low halves of words.
     [[nodiscard]] CellSurface sum(std::span<const uint64_t> pieces) const;
 

@@ -333,7 +333,8 @@ TEST(Coarsen, ColoursAndNormalsAreMeans) {
         return size_t{0};
     };
     const size_t both = at({0, 0, 0}, {50, 0, 0}), right = at({4096, 0, 0}, {4096, 0, 0});
-    EXPECT_EQ(coarse.colours[both], 0xff008021u);  // (0x10 + 0x31) / 2 and (0 + 0xff) / 2, rounded
+    // Half of the light of white is stored as 0xbc; that of 0x10 and 0x31 as 0x24.
+    EXPECT_EQ(coarse.colours[both], 0xff00bc24u);
     EXPECT_EQ(coarse.colours[right], 0x80402010u);
     // Taken without a sign, the two normals' mean is upright.
     EXPECT_GT(std::abs(f64::decodeNormal(coarse.normals[both]).z), 0.9999);

@@ -340,5 +340,27 @@ TEST(ColourEncoding, RoundTripsAndModulates) {
     EXPECT_EQ(toByte(std::nan("")), 0);
 }
 
+TEST(ColourEncoding, TablesSayWhatTheFormulasDo) {
+    for (int i = -10; i <= 10010; ++i) {
+        const double value = i / 10000.0, within = std::clamp(value, 0.0, 1.0);
+        EXPECT_NEAR(lightOfStored(value), srgbToLinear(within), 1e-5) << value;
+        EXPECT_EQ(byteOfLight(value), toByte(linearToSrgb(within))) << value;
+    }
+}
+
+TEST(ColourEncoding, MeansAreOfLight) {
+    LightMean mean;
+    mean.add(rgba(0, 255, 16, 0));
+    mean.add(rgba(0, 0, 49, 255));
+    const double green = linearToSrgb(0.5),
+                 blue = linearToSrgb((srgbToLinear(16 / 255.0) + srgbToLinear(49 / 255.0)) / 2);
+    EXPECT_EQ(mean.mean(), rgba(0, toByte(green), toByte(blue), 128));
+    for (unsigned i = 0; i < 256; ++i) {
+        LightMean same;
+        for (int k = 0; k < 3; ++k) same.add(rgba(i, 255 - i, i, i));
+        EXPECT_EQ(same.mean(), rgba(i, 255 - i, i, i));
+    }
+}
+
 }  // namespace
 }  // namespace vcp
