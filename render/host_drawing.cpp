@@ -1,7 +1,6 @@
 #include "render/host_drawing.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <map>
 #include <optional>
@@ -9,9 +8,9 @@
 
 #include <fmt/format.h>
 
-#include "octree/surface/morton.h"
 #include "render/frame_setup.h"
 #include "render/host/lit_layers.h"
+#include "render/host_layer.h"
 #include "render/residencies.h"
 
 namespace vcp {
@@ -23,83 +22,11 @@ Error unsupported(const char* what) {
             .message = fmt::format("the host does not draw {}; take a Vulkan device", what)};
 }
 
-/// The pages of a cut, as rays are cast through them; the views that the scene points to.
-struct PlacedCut {
-    std::vector<PageView> views;
-    std::vector<HostPage> pages;
-};
-
-PlacedCut placedCut(Residency& residency, ViewNumber view) {
-    const Dataset& dataset = residency.dataset();
-    const std::vector<uint64_t>& cut = residency.cut(view);
-    const std::vector<PartialPage>& partials = residency.partial(view);
-    PlacedCut placed;
-    placed.views.reserve(cut.size());
-    auto partial = partials.begin();
-    for (const uint64_t number : cut) {
-        const PageEntry& entry = dataset.pages[number];
-        const std::span<const std::byte> bytes = residency.pages().bytesOf(residency.slotOf(number));
-        const uint64_t colours = residency.hasColour() ? entry.colourBytes : 0;
-        placed.views.push_back(viewOfChecked(bytes.first(entry.pageBytes), bytes.subspan(entry.pageBytes, colours)));
-        HostPage page{.view = &placed.views.back(),
-                      .number = number,
-                      .place = mortonDecode(entry.morton),
-                      .level = entry.level,
-                      .error = float(double(entry.certifiedError) / dataset.header.cell),
-                      .parts = entry.parts};
-        if (partial == partials.end() || partial->page != number) {
-            placed.pages.push_back(page);
-            continue;
-        }
-        for (uint32_t octants = partial++->octants; octants != 0; octants &= octants - 1) {
-            page.octant = uint32_t(std::countr_zero(octants));
-            placed.pages.push_back(page);
-        }
-    }
-    return placed;
-}
-
-/// Returns the numbers, in the directory, of the pages that rays marked, and of those in whose place these are drawn.
-std::vector<uint64_t> markedPages(const Dataset& dataset, const HostScene& scene, const PageMarks& marks) {
-    std::vector<uint64_t> pages;
-    for (uint32_t i = 0; i < scene.pages(); ++i) {
-        if (!marks.isMarked(i)) continue;
-        const HostScene::Page& page = scene.page(i);
-        pages.push_back(page.number);
-        if (page.octant) pages.push_back(childIn(dataset.pages[page.number], *page.octant));
-    }
-    return pages;
-}
-
-/// Returns what rays of a grid over the picture met of one dataset: the pages that they hit.
-RayFeedback feedbackOf(const HostLayer& layer, const Dataset& dataset, const HostPicture& picture) {
-    RayFeedback feedback;
-    const glm::dvec3 origin = dataset.originOf(dataset.pages[0]);
-    const double rootEdge = dataset.edgeOf(dataset.pages[0]), unit = std::ldexp(rootEdge, -int(frame::kLatticeBits));
-    for (uint32_t ray = 0; ray < frame::kFeedbackRays; ++ray) {
-        const glm::dvec2 part(ray % frame::kFeedbackWidth, ray / frame::kFeedbackWidth);
-        const glm::dvec2 grid(frame::kFeedbackWidth, frame::kFeedbackHeight);
-        const glm::ivec2 pixel((part + 0.5) * glm::dvec2(picture.size) / grid);
-        const size_t at = size_t(pixel.y) * size_t(picture.size.x) + size_t(pixel.x);
-        if (picture.hits[at].dataset != layer.number) continue;
-        const glm::dvec3 from = layer.rays.originAt(pixel.x + 0.5, pixel.y + 0.5);
-        const glm::dvec3 along = glm::normalize(layer.rays.directionAt(pixel.x + 0.5, pixel.y + 0.5));
-        const double depth = double(picture.depth[at]) / layer.worldPerUnit;
-        const glm::dvec3 place = (from + depth * along - origin) / unit;
-        const uint64_t page = layer.scene.page(picture.hits[at].page).number;
-        constexpr double kLast = double((uint32_t{1} << frame::kLatticeBits) - 1);
-        feedback.hits.push_back({page, glm::ivec3(glm::clamp(place, 0.0, kLast)), ray});
-        feedback.passed.push_back({page, frame::kNearnessEps / (depth / rootEdge + frame::kNearnessEps)});
-    }
-    return feedback;
-}
-
 /// A dataset's layer of a picture, and what the layer points to.
 struct PlacedLayer {
     const HostDataset& drawn;
     FrameRequest seen;  // from the dataset's own space
-    PlacedCut cut;
-    std::optional<HostScene> scene;
+    std::optional<CutScene> cut;
     std::optional<PictureMarks> marks;  // where the dataset is asked which pages rays hit
 };
 
@@ -107,9 +34,9 @@ struct PlacedLayer {
 Result<void> place(PlacedLayer& layer, const FrameRequest& request) {
     Residency& residency = layer.drawn.residency;
     layer.seen = requestIn(layer.drawn.placement, requestOfLook(request, layer.drawn.number));
-    layer.cut = placedCut(residency, layer.drawn.view);
-    VCP_TRY_ASSIGN(layer.scene, HostScene::create(hostGrid(residency.dataset().header), layer.cut.pages));
-    if (request.sample == 0 && residency.asksRays(layer.drawn.view)) layer.marks.emplace(layer.scene->pages());
+    VCP_TRY_ASSIGN(layer.cut, CutScene::create(residency.dataset().header, residency.hasColour(),
+                                               cutPages(residency, layer.drawn.view)));
+    if (request.sample == 0 && residency.asksRays(layer.drawn.view)) layer.marks.emplace(layer.cut->scene().pages());
     return {};
 }
 
@@ -117,7 +44,7 @@ HostLayer layerOf(PlacedLayer& placed, const FrameRequest& request) {
     const HostDataset& drawn = placed.drawn;
     const Dataset& dataset = drawn.residency.dataset();
     const bool hasColour = drawn.residency.hasColour();
-    return {.scene = *placed.scene,
+    return {.scene = placed.cut->scene(),
             .rays = pictureRays(placed.seen),
             .frame = frameConstants(placed.seen, &dataset, 1, hasColour, drawn.errorPixels, drawn.placement),
             .hasColour = hasColour,
@@ -158,16 +85,14 @@ void tell(std::span<const PlacedLayer> placed, std::span<const HostLayer> layers
         const PlacedLayer& layer = placed[i];
         Residency& residency = layer.drawn.residency;
         const ViewNumber view = layer.drawn.view;
-        const auto marked = [&](const PageMarks& marks) {
-            return markedPages(residency.dataset(), *layer.scene, marks);
-        };
         if (layer.marks)
             seen.push_back({&residency,
-                            {marked(layer.marks->byCamera), marked(layer.marks->byLight)},
+                            {layer.cut->marked(layer.marks->byCamera), layer.cut->marked(layer.marks->byLight)},
                             selectionView(layer.seen),
                             residency.cutNumber(view)});
         if (residency.listens())
-            residency.hear(feedbackOf(layers[i], residency.dataset(), picture), selectionView(layer.seen));
+            residency.hear(feedbackOf(layers[i], residency.dataset(), picture, {0, 0, picture.size.y, picture.size.y}),
+                           selectionView(layer.seen));
     }
     if (!placed.empty()) seeAll(std::move(seen), placed.front().drawn.view);
 }
@@ -227,7 +152,7 @@ Result<HostPicture> drawOnHost(std::span<const HostDataset> datasets, std::span<
     const HostCastOptions options{.cancel = cancel};
     HostPicture picture({int(request.width), int(request.height)}, backgroundRows(request));
     std::vector<PlacedLayer> placed;
-    for (const HostDataset& each : datasets) placed.push_back({each, {}, {}, {}, {}});
+    for (const HostDataset& each : datasets) placed.push_back({each, {}, {}, {}});
     std::vector<HostLayer> layers;
     for (PlacedLayer& each : placed) {
         VCP_TRY(place(each, request));

@@ -56,7 +56,7 @@ const std::vector<Room>& rooms() {
         {"viewer/web/wasm/system/sys", {}},
         {"viewer/web/wasm/system/tbb", {}},
         {"viewer/web/wasm/system", {}},
-        {"viewer/web/wasm", {"octree/", "streaming", "render"}},
+        {"viewer/web/wasm", {"octree/", "streaming", "render", "render/host", "render/pages"}},
         {"viewer/window",
          {"octree/", "builder/", "render", "render/host", "streaming", "viewer/annotation", "viewer/camera",
           "viewer/scene", "viewer/picture", "viewer/export", "viewer"}},

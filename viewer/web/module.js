@@ -2,6 +2,7 @@
 import { decompress } from './fzstd.js';
 
 const kText = new TextEncoder();
+const kRecordBytes = 104; // of a CutRecord (wasm/page_copies.h)
 
 /// What WASI's library asks of a system. There is a clock and nothing else.
 function system(memory) {
@@ -28,7 +29,7 @@ function system(memory) {
 }
 
 export class Module {
-    /// `source`: the module's bytes, or an answer of fetch().
+    /// `source`: the module's bytes, an answer of fetch(), or what another instance was compiled to.
     static async load(source) {
         const made = new Module();
         const memory = () => made.wasm.memory;
@@ -36,7 +37,9 @@ export class Module {
             wasi_snapshot_preview1: system(memory),
             vcp: { unzstd: (to, room, from, bytes) => made.unzstd(to, room, from, bytes) },
         };
-        const compiled = await WebAssembly.compile(source instanceof Response ? await source.arrayBuffer() : source);
+        const isCompiled = source instanceof WebAssembly.Module;
+        const compiled = isCompiled ? source : await WebAssembly.compile(source instanceof Response ? await source.arrayBuffer() : source);
+        made.compiled = compiled;
         // Imports are named one by one: an instance does not look into a proxy for what it does not list.
         const wasi = {};
         for (const { module, name } of WebAssembly.Module.imports(compiled))
@@ -126,20 +129,86 @@ export class Module {
             relaxed: n[5] === 1, problem: n[6] > 0 ? this.error() : null,
         };
     }
-    render() {
-        this.checked(this.wasm.vcp_render());
+    /// Begins a sample of the view: 0 draws the last update's cut, others add to that picture. Returns how many bands of
+    /// how many rows it has, 0 bands where the picture cannot go on, and what others begin the sample with.
+    beginSample(sample) {
+        return this.begun(this.wasm.vcp_begin_sample(sample));
     }
-    refine() {
-        return this.checked(this.wasm.vcp_refine());
+    begun(result) {
+        const bands = this.checked(result);
+        const [rows, errorPixels, asksRays, listens] = this.numbers(this.wasm.vcp_numbers(), 4);
+        return { bands, rows, errorPixels, asksRays, listens };
     }
-    /// Returns a copy of the picture.
-    picture(width, height) {
-        const at = this.wasm.vcp_picture();
-        return new Uint8ClampedArray(this.wasm.memory.buffer, at, 4 * width * height).slice();
+    /// Casts `count` bands of `rows` rows from `first` on. Returns the milliseconds that each took and, where it `shows`,
+    /// the rows' pixels.
+    castBands({ width, height }, rows, first, count, shows) {
+        const firstRow = first * rows, lastRow = Math.min(height, (first + count) * rows);
+        const pixels = shows ? new Uint8ClampedArray(4 * width * (lastRow - firstRow)) : null, ms = new Float64Array(count);
+        for (let band = first; band < first + count; ++band) {
+            const began = performance.now(), row = band * rows, bytes = 4 * width * (Math.min(lastRow, row + rows) - row);
+            this.wasm.vcp_cast(band);
+            if (shows) {
+                const at = this.wasm.vcp_colours();
+                pixels.set(new Uint8Array(this.wasm.memory.buffer, at, bytes), 4 * width * (row - firstRow));
+            }
+            ms[band - first] = performance.now() - began;
+        }
+        return { pixels, ms };
     }
-    depth(width, height) {
-        return new Float32Array(this.wasm.memory.buffer, this.wasm.vcp_depth(), width * height).slice();
+    /// Returns the distances along the rays of the band cast last.
+    depth(pixels) {
+        return new Float32Array(this.wasm.memory.buffer, this.wasm.vcp_depth(), pixels).slice();
     }
+    /// Returns what the rays of the sample said here, for hear().
+    said() {
+        const count = this.wasm.vcp_said();
+        return new Float64Array(this.wasm.memory.buffer, this.wasm.vcp_said_numbers(), count).slice();
+    }
+    hear(said) {
+        this.with(said, at => this.wasm.vcp_hear(at));
+    }
+    /// What the rays of all bands of sample 0 said counts.
+    endSample({ asksRays, listens }) {
+        this.wasm.vcp_end_sample(asksRays, listens);
+    }
+
+    /// Returns the pages that `count` rows of the picture from `first` on need: `records` for beginCopied(), and of each
+    /// page its number and where its bytes are.
+    needed(first, count) {
+        const pages = this.wasm.vcp_needed(first, count), at = this.wasm.vcp_records();
+        const records = new Uint8Array(this.wasm.memory.buffer, at, kRecordBytes * pages).slice();
+        const view = new DataView(records.buffer);
+        const list = Array.from({ length: pages }, (_, i) => ({
+            number: Number(view.getBigUint64(kRecordBytes * i, true)), bytes: view.getUint32(kRecordBytes * i + 92, true),
+            address: view.getUint32(kRecordBytes * i + 96, true),
+        }));
+        return { records, list };
+    }
+    /// Returns a copy of bytes of the module's memory.
+    copyOf(address, bytes) {
+        return new Uint8Array(this.wasm.memory.buffer, address, bytes).slice();
+    }
+    /// Returns what an instance without pages must know of the scan.
+    lead() {
+        return this.copyOf(this.wasm.vcp_lead(), this.wasm.vcp_lead_bytes());
+    }
+    /// Begins in such an instance.
+    follow(lead) {
+        this.with(lead, at => this.wasm.vcp_follow(at));
+    }
+    takePage(number, bytes) {
+        const at = this.wasm.vcp_room(number, bytes.length);
+        new Uint8Array(this.wasm.memory.buffer, at, bytes.length).set(bytes);
+    }
+    dropPage(number) {
+        this.wasm.vcp_drop(number);
+    }
+    /// Begins a sample that another instance began, with pages that were taken.
+    beginCopied(records, sample, { errorPixels, asksRays, listens }) {
+        return this.with(records, at => this.begun(this.wasm.vcp_begin_copied(
+            at, records.length / kRecordBytes, sample, errorPixels, asksRays, listens)));
+    }
+
     pick(x, y) {
         if (this.wasm.vcp_pick(x, y) !== 1) return null;
         const n = this.numbers(this.wasm.vcp_numbers(), 5);

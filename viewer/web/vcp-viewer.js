@@ -9,12 +9,25 @@ const kRestMs = 160; // without a movement: the view is at rest
 const kSaidMs = 4000; // a line that answers a button stands as long
 const kTapMs = 300, kTapPixels = 24; // two taps so near each other are one double tap
 const kMostPixels = 1.6e6;
-const kPhoneBudget = 64 << 20, kBudget = 192 << 20; // of decoded pages; the module takes at most as much again
+const kPhoneBudget = 64 << 20, kBudget = 192 << 20; // of decoded pages, in all workers
+const kWorkerBudget = 32 << 20, kLeastShare = 1 << 20; // of the budget for each worker more; of what it holds of pages
+const kMostWorkers = 8;
 
 const kTheme = {
     dark: { top: [0.10, 0.12, 0.15], bottom: [0.25, 0.27, 0.30] },
     light: { top: [0.78, 0.81, 0.85], bottom: [0.92, 0.93, 0.95] },
 };
+
+/// Returns how the budget is shared: the pages of the first worker, and what each of the others may hold of them. Others
+/// have a third of it together. `asked`: workers, NaN where that is left to the browser.
+function sharedBudget(budgetBytes, asked) {
+    const others = Number.isInteger(asked) && asked > 0
+        ? Math.min(asked - 1, Math.floor(budgetBytes / 3 / kLeastShare))
+        : Math.min((navigator.hardwareConcurrency || 1) - 1, Math.floor(budgetBytes / kWorkerBudget), kMostWorkers - 1);
+    if (others === 0) return { pageBytes: budgetBytes, others, shareBytes: 0 };
+    const shareBytes = Math.floor(budgetBytes / 3 / others);
+    return { pageBytes: budgetBytes - others * shareBytes, others, shareBytes };
+}
 
 /// A length for people: three digits.
 function lengthText(x) {
@@ -48,6 +61,8 @@ export class VcpViewer extends HTMLElement {
         this.problems = {}; // by what has one: page, scan, notes
         this.said = this.loading = '';
         this.picks = new Map();
+        this.worker = null;
+        this.casters = []; // the workers beside it
         this.listen();
     }
 
@@ -79,8 +94,7 @@ export class VcpViewer extends HTMLElement {
         document.removeEventListener('visibilitychange', this.onHidden);
         removeEventListener('online', this.onOnline);
         this.resizing.disconnect();
-        this.worker?.terminate();
-        this.worker = null;
+        this.endWorkers();
     }
     attributeChangedCallback(name, before, now) {
         if (!this.isConnected || before === now) return;
@@ -147,8 +161,29 @@ export class VcpViewer extends HTMLElement {
         }, kSaidMs);
     }
 
+    endWorkers() {
+        for (const worker of [this.worker, ...this.casters]) worker?.terminate();
+        this.worker = null;
+        this.casters = [];
+    }
+    /// Starts the workers beside the first one, which speaks to each through a channel.
+    startCasters() {
+        const { others, shareBytes } = this.shared;
+        for (let number = 0; number < others; ++number) {
+            const caster = new Worker(new URL('./caster.js', import.meta.url), { type: 'module' });
+            const { port1, port2 } = new MessageChannel(), first = this.worker;
+            caster.onerror = event => {
+                event.preventDefault(); // the first worker does without it
+                first.postMessage({ type: 'lost', number });
+            };
+            caster.postMessage({ port: port1 }, [port1]);
+            first.postMessage({ type: 'caster', number, port: port2, shareBytes }, [port2]);
+            this.casters.push(caster);
+        }
+    }
+
     open() {
-        this.worker?.terminate();
+        this.endWorkers();
         this.info = null;
         this.points = [];
         this.problems = {};
@@ -158,9 +193,11 @@ export class VcpViewer extends HTMLElement {
         this.worker.onmessage = ({ data }) => this.hear(data);
         this.worker.onerror = event => this.fail('scan', event.message || 'the viewer could not be loaded');
         const isPhone = matchMedia('(pointer: coarse)').matches;
+        const budget = Number(this.getAttribute('budget')) * 2 ** 20 || (isPhone ? kPhoneBudget : kBudget);
+        this.shared = sharedBudget(budget, Number(this.getAttribute('workers') ?? NaN));
         this.worker.postMessage({
             type: 'open', url: new URL(this.src, document.baseURI).href, wasm: new URL('./vcp.wasm', import.meta.url).href,
-            budgetBytes: Number(this.getAttribute('budget')) * 2 ** 20 || (isPhone ? kPhoneBudget : kBudget),
+            budgetBytes: this.shared.pageBytes,
         });
         this.readNotes();
     }
@@ -169,6 +206,7 @@ export class VcpViewer extends HTMLElement {
         if (message.type === 'opened') {
             this.info = message.info;
             if (!this.info.hasColour) this.parts.select.querySelector('[value="unlit"]')?.remove();
+            this.startCasters();
             this.fit();
             const link = /(?:^#|&)vcp=([^&]+)/.exec(location.hash);
             if (link && this.orbit.fromText(decodeURIComponent(link[1]))) this.look(false);
@@ -187,7 +225,7 @@ export class VcpViewer extends HTMLElement {
         else if (message.type === 'error') this.fail('scan', message.message);
     }
 
-    show({ width, height, pixels, number, samples, update, fetched, memoryBytes }) {
+    show({ width, height, pixels, number, samples, update, fetched, memoryBytes, workers }) {
         const { canvas } = this.parts;
         if (canvas.width !== width || canvas.height !== height) {
             canvas.width = width;
@@ -197,7 +235,7 @@ export class VcpViewer extends HTMLElement {
         this.loading = update.settled ? '' : `Loading, ${(fetched.bytes / 1e6).toFixed(1)} MB`;
         this.showStatus();
         this.drawOver();
-        this.tell('progress', { number, samples, ...update, ...fetched, memoryBytes });
+        this.tell('progress', { number, samples, ...update, ...fetched, memoryBytes, workers });
     }
 
     fit() {

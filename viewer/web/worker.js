@@ -1,6 +1,8 @@
-// The worker of a viewer: fetches, decodes and draws, so that the page never waits.
+// The first worker of a viewer: fetches, decodes, chooses pages and draws, with others where there are any (share.js), so
+// that the page never waits.
 import { Module } from './module.js';
 import { Ranges, joined } from './ranges.js';
+import { Caster, costsOf, partsOf } from './share.js';
 
 const kLead = 64 << 10;      // bytes of the first request: header, directory and the coarsest pages
 const kGap = 32 << 10;       // pages so near each other are fetched in one request
@@ -11,6 +13,9 @@ const kSamples = 8;          // of a pixel, where a view is at rest
 
 let module, ranges, view = null, awake = null, fetching = 0, failed = null, drawn = null, hidden = false;
 const asked = new Set(); // offsets under way
+const casters = []; // the other workers
+let plan = null; // which bands of the picture are whose
+let costs = []; // milliseconds of each band of the last picture
 
 function post(type, more = {}, transfer = []) {
     self.postMessage({ type, ...more }, transfer);
@@ -63,14 +68,60 @@ function lineOf(error) {
     return error.message;
 }
 
-/// Draws the view anew and shows it.
-function draw(update, samples) {
-    const { width, height } = view;
-    const pixels = module.picture(width, height);
-    post('picture', {
-        width, height, pixels, number: view.number, samples, fetched: { requests: ranges.requests, bytes: ranges.bytes },
-        update, memoryBytes: module.memoryBytes(),
-    }, [pixels.buffer]);
+/// Shares the bands of a picture out. What another worker has no room for is cast here.
+function planned({ bands, rows }) {
+    const ready = casters.filter(caster => caster.isReady), parts = partsOf(costsOf(costs, bands), ready.length + 1);
+    const own = [parts[0]], jobs = [];
+    ready.forEach((caster, i) => {
+        const part = parts[i + 1], fitted = caster.fit(module, rows, part);
+        if (fitted.count > 0) jobs.push({ caster, part: fitted });
+        if (fitted.count < part.count) own.push({ first: part.first + fitted.count, count: part.count - fitted.count });
+    });
+    return { own, jobs };
+}
+
+/// Casts a sample of the view, and shows the picture where it is worth it. Returns how many samples there are then; 0
+/// where the picture cannot go on, null where it must be begun again.
+async function draw(view, update, sample) {
+    const begun = module.beginSample(sample), { rows } = begun, { width, height } = view;
+    if (begun.bands === 0) return 0;
+    if (sample === 0) plan = planned(begun);
+    else if (plan.jobs.some(({ caster }) => !caster.isReady)) return null;
+    const shows = (sample + 1 & sample) === 0, pixels = shows ? new Uint8ClampedArray(4 * width * height) : null;
+    const ms = Array(begun.bands).fill(0);
+    const put = (first, done) => {
+        done.ms.forEach((x, i) => { ms[first + i] = x; });
+        if (shows) pixels.set(done.pixels, 4 * width * first * rows);
+    };
+    const castHere = ({ first, count }) => put(first, module.castBands(view, rows, first, count, shows));
+    const asked = plan.jobs.map(({ caster, part }) =>
+        caster.cast(module, { view, sample, begun, shows }, sample === 0 ? part : caster.fit(module, rows, part)));
+    plan.own.forEach(castHere);
+    const answers = await Promise.all(asked), kept = [];
+    answers.forEach((done, i) => {
+        const { part } = plan.jobs[i];
+        if (done === null) return plan.own.push(part);
+        kept.push(plan.jobs[i]);
+        put(part.first, done);
+        module.hear(done.said);
+    });
+    if (kept.length < plan.jobs.length) {
+        // The samples that a lost worker had are lost with it.
+        if (sample > 0) return null;
+        plan.own.slice(kept.length - plan.jobs.length).forEach(castHere);
+        plan.jobs = kept;
+    }
+    if (sample === 0) module.endSample(begun);
+    costs = ms;
+    if (shows) show(view, update, sample + 1, pixels);
+    return sample + 1;
+}
+
+function show({ width, height, number }, update, samples, pixels) {
+    const fetched = { requests: ranges.requests, bytes: ranges.bytes }, ready = casters.filter(caster => caster.isReady);
+    const memoryBytes = ready.reduce((sum, caster) => sum + caster.memoryBytes, module.memoryBytes());
+    post('picture', { width, height, pixels, number, samples, fetched, update, memoryBytes, workers: 1 + ready.length },
+        [pixels.buffer]);
 }
 
 /// What is seen at a place of the picture, 0 to 1 from its upper left corner; null where the view has not been drawn.
@@ -99,13 +150,10 @@ async function run() {
         if (update.problem) post('problem', { message: update.problem });
         const isNew = drawn?.view !== now || update.changed || update.awaitsRays;
         if (update.drawable && isNew) {
-            module.render();
-            drawn = { view: now, samples: 1 };
-            draw(update, 1);
+            drawn = { view: now, samples: await draw(now, update, 0) };
         } else if (update.settled && !now.moving && drawn?.view === now && drawn.samples < kSamples && now.mode < 3) {
-            const samples = module.refine();
-            drawn.samples = samples === 0 ? kSamples : samples;
-            if (samples > 0 && (samples & (samples - 1)) === 0) draw(update, samples);
+            const samples = await draw(now, update, drawn.samples);
+            drawn = samples === null ? null : { view: now, samples: samples === 0 ? kSamples : samples };
         } else if (view === now) {
             if (update.settled && !now.moving) post('settled', { number: now.number, update });
             await new Promise(done => {
@@ -129,6 +177,12 @@ self.onmessage = async ({ data }) => {
             else wake();
         } else if (data.type === 'pick') {
             post('picked', { id: data.id, hit: hitAt(data) });
+        } else if (data.type === 'caster') {
+            // It takes part from the next picture on.
+            casters[data.number] = new Caster(data.port, data.shareBytes);
+            data.port.postMessage({ type: 'follow', compiled: module.compiled, lead: module.lead() });
+        } else if (data.type === 'lost') {
+            casters[data.number].lose();
         } else if (data.type === 'hide') {
             hidden = data.hidden; // nothing is drawn that nobody sees
             wake();

@@ -38,7 +38,7 @@ expect 1 "short.vcp" "$vcp" publish short.vcp -o site --viewer viewer
 "$vcp" publish scan.vcp -o site/ --viewer viewer >/dev/null
 cmp scan.vcp site/scan.vcp
 for file in viewer/*; do cmp "$file" "site/$(basename "$file")"; done
-[ "$(ls -A site | wc -l)" = 12 ] || fail "site holds $(ls -A site)"
+[ "$(ls -A site | wc -l)" = 14 ] || fail "site holds $(ls -A site)"
 grep -q 'src="scan.vcp"' site/index.html || fail "the page shows another file"
 
 expect 2 "--overwrite" "$vcp" publish scan.vcp -o site --viewer viewer

@@ -22,9 +22,9 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kPage = "index.html";
-constexpr std::array<std::string_view, 11> kViewerFiles{kPage,       "vcp-viewer.js", "vcp-viewer.d.ts", "worker.js",
-                                                        "module.js", "camera.js",     "markup.js",       "ranges.js",
-                                                        "fzstd.js",  "fzstd.LICENSE", "vcp.wasm"};
+constexpr std::array<std::string_view, 13> kViewerFiles{
+    kPage,       "vcp-viewer.js", "vcp-viewer.d.ts", "worker.js", "module.js",     "camera.js", "markup.js",
+    "ranges.js", "caster.js",     "share.js",        "fzstd.js",  "fzstd.LICENSE", "vcp.wasm"};
 
 Error io(const fs::path& file, const char* what, const std::error_code& failed) {
     return systemError(file, what, failed.value());

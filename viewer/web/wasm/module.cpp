@@ -1,10 +1,12 @@
-// What a worker of the browser calls: one dataset, drawn by the host's caster in the calling thread.
+// What a worker of the browser calls. Of the workers of one scan, the first holds the pages: it reads them, chooses the
+// cut, and casts; the others cast from copies of the pages that their bands of a picture need.
 //
 // Numbers cross as doubles, which hold every size of a file below 2^53. A call that can fail returns a negative number
 // then, and vcp_error() the line that says why.
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <cstring>
 #include <iterator>
 #include <limits>
 #include <memory>
@@ -12,8 +14,14 @@
 
 #include "octree/dataset_reader.h"
 #include "render/frame_setup.h"
-#include "render/host_renderer.h"
+#include "render/host_drawing.h"
+#include "render/pages/host_page_memory.h"
+#include "render/pixel_samples.h"
+#include "render/renderer_options.h"
+#include "render/residencies.h"
+#include "viewer/web/wasm/band_caster.h"
 #include "viewer/web/wasm/fetched_bytes.h"
+#include "viewer/web/wasm/page_copies.h"
 
 #define EXPORT(name) extern "C" __attribute__((export_name(#name)))
 
@@ -22,18 +30,33 @@ namespace {
 using namespace vcp;
 
 constexpr int kFailed = -1, kDone = 0, kMissing = 1;
-constexpr uint64_t kFetchedBytes = 8u << 20;
+constexpr uint64_t kFetchedBytes = 8u << 20, kUploadBytes = 4u << 20;
+
+/// What a worker that holds no pages must know of the scan.
+struct Lead {
+    FileHeader header;
+    PageEntry root;
+    uint64_t hasColour;
+};
 
 /// What is open.
 struct Opened {
     std::shared_ptr<FetchedBytes> bytes;
     std::shared_ptr<const Dataset> dataset;
-    std::unique_ptr<HostRenderer> renderer;
+    bool hasColour = false;
+    std::vector<PlacedResidency> placed;  // one, in the worker that holds the pages
     uint64_t budgetBytes = 0;
+    double errorPixels = 0;  // of the last update
+    PagesNeeded needed;
+    PageCopies copies;
     FrameRequest request;
-    UpdateResult update;
-    Picture picture;
-    std::vector<float> depth;
+    SelectionView view;  // of the sample begun last
+    uint64_t cut = 0;    // number of the picture's cut
+    BandCaster caster;
+    BandsSaid heard;
+    std::vector<CutRecord> records;
+    std::vector<double> said;
+    Lead lead;
     std::vector<Stretch> missing;
     std::string error;
     double numbers[32] = {};
@@ -44,13 +67,40 @@ int fail(const Error& error) {
     return kFailed;
 }
 
+Residency& residency() { return *opened.placed.front().residency; }
+
 Result<void> start(Dataset dataset) {
     opened.dataset = std::make_shared<const Dataset>(std::move(dataset));
-    VCP_TRY_ASSIGN(opened.renderer, HostRenderer::create({.budgetBytes = opened.budgetBytes}));
+    VCP_TRY(checkBudget(opened.budgetBytes));
+    VCP_TRY(checkHostDraws(*opened.dataset, opened.bytes->name()));
     std::vector<PlacedDataset> datasets(1);
     datasets[0].dataset = opened.dataset;
     datasets[0].source = std::make_shared<FilePageSource>(opened.bytes, opened.dataset);
-    return opened.renderer->open(std::move(datasets), {});
+    const RendererOptions options{.budgetBytes = opened.budgetBytes, .uploadBytes = kUploadBytes};
+    VCP_TRY_ASSIGN(opened.placed, openResidencies(hostPageMemory(), options, std::move(datasets)));
+    opened.errorPixels = std::numeric_limits<double>::infinity();
+    opened.hasColour = residency().hasColour();
+    return {};
+}
+
+Result<UpdateResult> update() {
+    VCP_TRY(checkRequest(opened.request));
+    VCP_TRY(checkHostDraws(opened.request));
+    const ShownResidency shown{&residency(), {}, &opened.errorPixels};
+    VCP_TRY_ASSIGN(auto update, updateShown({&shown, 1}, opened.request));
+    return *std::move(update);
+}
+
+/// Begins a sample; vcp_numbers() are then what other workers begin it with.
+int beginSample(const BandFrame& frame, std::vector<CutPage> cut) {
+    const auto begun = opened.caster.begin(*opened.dataset, opened.hasColour, frame, std::move(cut));
+    if (!begun) return fail(begun.error());
+    opened.heard = {};
+    opened.view = selectionView(frame.request);
+    const double numbers[] = {double(BandCaster::rowsOf(frame.request)), frame.errorPixels, frame.asksRays ? 1.0 : 0.0,
+                              frame.listens ? 1.0 : 0.0};
+    std::copy(std::begin(numbers), std::end(numbers), opened.numbers);
+    return int(BandCaster::bandsOf(frame.request));
 }
 
 }  // namespace
@@ -127,12 +177,11 @@ EXPORT(vcp_look) void vcp_look(const double* from) {
 
 /// Takes in pages that have come. Returns bits: 1 a picture can be drawn, 2 settled, 4 awaits rays, 8 the cut changed.
 /// vcp_numbers() are then: error in pixels, bytes resident, pages missing, pages in the cut, failures, 1 where the
-/// budget limits.
+/// budget limits, and the number of problems, of which vcp_error() is the first.
 EXPORT(vcp_update) int vcp_update() {
-    auto update = opened.renderer->update(opened.request);
-    if (!update) return fail(update.error());
-    opened.update = *std::move(update);
-    const UpdateResult& now = opened.update;
+    const auto updated = update();
+    if (!updated) return fail(updated.error());
+    const UpdateResult& now = *updated;
     if (!now.problems.empty()) opened.error = now.problems.front().line();
     const double numbers[] = {
         now.errorPixels,      double(now.residentBytes), double(now.pagesMissing),   double(now.pagesInCut),
@@ -142,40 +191,122 @@ EXPORT(vcp_update) int vcp_update() {
 }
 EXPORT(vcp_numbers) const double* vcp_numbers() { return opened.numbers; }
 
-/// Draws the cut of the last update, a ray a pixel.
-EXPORT(vcp_render) int vcp_render() {
-    if (const auto drawn = opened.renderer->render(opened.request); !drawn) return fail(drawn.error());
-    auto depth = opened.renderer->readDepth();
-    if (!depth) return fail(depth.error());
-    opened.depth = *std::move(depth);
-    return kDone;
+/// Begins a sample of the view: 0 draws the cut of the last update anew, others add to it. Returns the number of its
+/// bands, 0 where the cut is not the picture's any more. vcp_numbers() are then: rows of a band, error in pixels,
+/// whether rays are asked which pages they hit, and where.
+EXPORT(vcp_begin_sample) int vcp_begin_sample(int sample) {
+    const uint64_t cut = residency().cutNumber();
+    if (sample > 0 && cut != opened.cut) return 0;
+    opened.cut = cut;
+    BandFrame frame{opened.request, opened.errorPixels, sample == 0 && residency().asksRays(),
+                    sample == 0 && residency().listens()};
+    if (sample > 0) {
+        const auto refinable = checkRefinable(frame.request, uint32_t(sample));
+        if (!refinable) return fail(refinable.error());
+    }
+    frame.request.sample = uint32_t(sample);
+    return beginSample(frame, cutPages(residency()));
 }
 
-/// Adds a sample to each pixel. Returns how many there are; 0 where the picture cannot go on.
-EXPORT(vcp_refine) int vcp_refine() {
-    const auto samples = opened.renderer->refine();
-    return samples ? int(*samples) : fail(samples.error());
+/// Casts a band of the sample.
+EXPORT(vcp_cast) void vcp_cast(int band) { opened.caster.cast(uint32_t(band)); }
+/// Returns the colours of the band cast last, RGBA8, row by row: the mean of its samples.
+EXPORT(vcp_colours) const uint32_t* vcp_colours() { return opened.caster.colours().data(); }
+/// Returns its distances along the unit rays, world units; infinite where nothing is hit.
+EXPORT(vcp_depth) const float* vcp_depth() { return opened.caster.depth().data(); }
+
+/// Writes down what the rays of the bands cast here said, for vcp_hear(). Returns how many numbers it is.
+EXPORT(vcp_said) int vcp_said() {
+    const BandsSaid said = opened.caster.said();
+    std::vector<double>& to = opened.said;
+    to = {double(said.hit.byCamera.size()), double(said.hit.byLight.size()), double(said.feedback.hits.size())};
+    to.insert(to.end(), said.hit.byCamera.begin(), said.hit.byCamera.end());
+    to.insert(to.end(), said.hit.byLight.begin(), said.hit.byLight.end());
+    for (size_t i = 0; i < said.feedback.hits.size(); ++i) {
+        const auto& [page, place, ray] = said.feedback.hits[i];
+        to.insert(to.end(), {double(page), double(place.x), double(place.y), double(place.z), double(ray),
+                             said.feedback.passed[i].nearness});
+    }
+    return int(to.size());
+}
+EXPORT(vcp_said_numbers) const double* vcp_said_numbers() { return opened.said.data(); }
+
+/// Takes in what rays of other bands said.
+EXPORT(vcp_hear) void vcp_hear(const double* from) {
+    const double* next = from + 3;
+    BandsSaid said;
+    for (int i = 0; i < int(from[0]); ++i) said.hit.byCamera.push_back(uint64_t(*next++));
+    for (int i = 0; i < int(from[1]); ++i) said.hit.byLight.push_back(uint64_t(*next++));
+    for (int i = 0; i < int(from[2]); ++i, next += 6) {
+        said.feedback.hits.push_back(
+            {uint64_t(next[0]), {int(next[1]), int(next[2]), int(next[3])}, uint32_t(next[4])});
+        said.feedback.passed.push_back({uint64_t(next[0]), next[5]});
+    }
+    opened.heard.add(said);
 }
 
-/// Returns the picture, RGBA8, row by row from the upper left; null where there is none.
-EXPORT(vcp_picture) const uint8_t* vcp_picture() {
-    auto picture = opened.renderer->readPicture();
-    if (!picture) return nullptr;
-    opened.picture = *std::move(picture);
-    return opened.picture.rgba.data();
+/// All bands of sample 0 are cast and heard: what their rays said counts.
+EXPORT(vcp_end_sample) void vcp_end_sample(int asksRays, int listens) {
+    BandsSaid said = opened.caster.said();
+    said.add(opened.heard);
+    if (asksRays != 0) {
+        std::vector<SeenPages> seen;
+        seen.push_back({&residency(), std::move(said.hit), opened.view, opened.cut});
+        seeAll(std::move(seen));
+    }
+    if (listens != 0) residency().hear(said.feedback, opened.view);
 }
-/// Returns distances along the unit rays, world units; infinite where nothing is hit.
-EXPORT(vcp_depth) const float* vcp_depth() { return opened.depth.data(); }
 
-/// Finds what a pixel of the last picture shows. Returns 1 where something is hit; vcp_numbers() are then its place,
-/// its depth, and by how much the surface that is drawn may be off there (both in world units).
+/// Finds the pages that `count` rows of the picture from `first` on need. Returns how many they are; vcp_records() are
+/// then their CutRecords.
+EXPORT(vcp_needed) int vcp_needed(int first, int count) {
+    opened.records =
+        opened.needed.of(*opened.dataset, opened.request, cutPages(residency()), uint32_t(first), uint32_t(count));
+    return int(opened.records.size());
+}
+EXPORT(vcp_records) const CutRecord* vcp_records() { return opened.records.data(); }
+
+/// Returns what other workers must know of the scan, and how many bytes it is.
+EXPORT(vcp_lead) const Lead* vcp_lead() {
+    opened.lead = {opened.dataset->header, opened.dataset->pages[0], opened.hasColour ? 1u : 0u};
+    return &opened.lead;
+}
+EXPORT(vcp_lead_bytes) int vcp_lead_bytes() { return sizeof(Lead); }
+
+/// Begins in a worker that holds no pages.
+EXPORT(vcp_follow) void vcp_follow(const Lead* lead) {
+    opened = {};
+    auto dataset = std::make_shared<Dataset>();
+    dataset->header = lead->header;
+    dataset->pages.push_back(lead->root);
+    opened.dataset = std::move(dataset);
+    opened.hasColour = lead->hasColour != 0;
+}
+/// Returns where to put the copy of a page.
+EXPORT(vcp_room) std::byte* vcp_room(double page, int bytes) {
+    return opened.copies.room(uint64_t(page), uint32_t(bytes));
+}
+EXPORT(vcp_drop) void vcp_drop(double page) { opened.copies.drop(uint64_t(page)); }
+/// Does vcp_begin_sample with a cut of pages that were copied.
+EXPORT(vcp_begin_copied)
+int vcp_begin_copied(const CutRecord* records, int count, int sample, double errorPixels, int asksRays, int listens) {
+    auto cut = opened.copies.cutOf({records, size_t(count)});
+    if (!cut) return fail(cut.error());
+    BandFrame frame{opened.request, errorPixels, asksRays != 0, listens != 0};
+    frame.request.sample = uint32_t(sample);
+    return beginSample(frame, *std::move(cut));
+}
+
+/// Finds what a pixel of the view shows. Returns 1 where something is hit; vcp_numbers() are then its place, its depth,
+/// and by how much the surface that is drawn may be off there (both in world units).
 EXPORT(vcp_pick) int vcp_pick(int x, int y) {
     const FrameRequest& request = opened.request;
-    const float depth = opened.depth[size_t(y) * request.width + size_t(x)];
+    const float depth =
+        depthAt(*opened.dataset, request, cutPages(residency()), opened.hasColour, uint32_t(x), uint32_t(y));
     if (!(depth < std::numeric_limits<float>::infinity())) return 0;
     const PixelHit hit = pixelHit(request, {uint32_t(x), uint32_t(y)}, double(depth), {});
     const double pixel = hit.depth * 2 * std::tan(request.camera.verticalFov / 2) / request.height;
-    const double error = std::max(opened.update.errorPixels * pixel, opened.dataset->header.certifiedErrorMax);
+    const double error = std::max(opened.errorPixels * pixel, opened.dataset->header.certifiedErrorMax);
     const double numbers[] = {hit.position.x, hit.position.y, hit.position.z, hit.depth, error};
     std::copy(std::begin(numbers), std::end(numbers), opened.numbers);
     return 1;

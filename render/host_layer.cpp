@@ -1,0 +1,94 @@
+#include "render/host_layer.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+
+#include "octree/surface/morton.h"
+
+namespace vcp {
+
+std::vector<CutPage> cutPages(Residency& residency, ViewNumber view) {
+    const std::vector<PartialPage>& partials = residency.partial(view);
+    auto partial = partials.begin();
+    std::vector<CutPage> cut;
+    for (const uint64_t number : residency.cut(view)) {
+        const PageEntry& entry = residency.dataset().pages[number];
+        const bool isPartial = partial != partials.end() && partial->page == number;
+        const uint64_t bytes = entry.pageBytes + (residency.hasColour() ? entry.colourBytes : 0);
+        cut.push_back({.number = number,
+                       .entry = entry,
+                       .octants = isPartial ? partial++->octants : 0u,
+                       .bytes = residency.pages().bytesOf(residency.slotOf(number)).first(bytes)});
+    }
+    return cut;
+}
+
+Result<CutScene> CutScene::create(const FileHeader& header, bool withColour, std::vector<CutPage> cut) {
+    CutScene made;
+    made.cut_ = std::move(cut);
+    made.views_.reserve(made.cut_.size());
+    std::vector<HostPage> pages;
+    for (const CutPage& each : made.cut_) {
+        const PageEntry& entry = each.entry;
+        const uint64_t colours = withColour ? entry.colourBytes : 0;
+        made.views_.push_back(
+            viewOfChecked(each.bytes.first(entry.pageBytes), each.bytes.subspan(entry.pageBytes, colours)));
+        HostPage page{.view = &made.views_.back(),
+                      .number = each.number,
+                      .place = mortonDecode(entry.morton),
+                      .level = entry.level,
+                      .error = float(double(entry.certifiedError) / header.cell),
+                      .parts = entry.parts};
+        if (each.octants == 0) pages.push_back(page);
+        for (uint32_t octants = each.octants; octants != 0; octants &= octants - 1) {
+            page.octant = uint32_t(std::countr_zero(octants));
+            pages.push_back(page);
+        }
+    }
+    VCP_TRY_ASSIGN(made.scene_, HostScene::create(hostGrid(header), pages));
+    return made;
+}
+
+std::vector<uint64_t> CutScene::marked(const PageMarks& marks) const {
+    std::vector<uint64_t> pages;
+    for (uint32_t i = 0; i < scene_.pages(); ++i) {
+        if (!marks.isMarked(i)) continue;
+        const HostScene::Page& page = scene_.page(i);
+        pages.push_back(page.number);
+        if (!page.octant) continue;
+        const auto of = std::lower_bound(cut_.begin(), cut_.end(), page.number,
+                                         [](const CutPage& each, uint64_t number) { return each.number < number; });
+        pages.push_back(childIn(of->entry, *page.octant));
+    }
+    return pages;
+}
+
+RayFeedback feedbackOf(const HostLayer& layer, const Dataset& dataset, const HostPicture& picture, RowsOfWhole rows) {
+    RayFeedback feedback;
+    const glm::dvec3 origin = dataset.originOf(dataset.pages[0]);
+    const double rootEdge = dataset.edgeOf(dataset.pages[0]), unit = std::ldexp(rootEdge, -int(frame::kLatticeBits));
+    const glm::dvec2 size(picture.size.x, rows.wholeHeight), grid(frame::kFeedbackWidth, frame::kFeedbackHeight);
+    for (uint32_t ray = 0; ray < frame::kFeedbackRays; ++ray) {
+        const glm::dvec2 part(ray % frame::kFeedbackWidth, ray / frame::kFeedbackWidth);
+        glm::ivec2 pixel((part + 0.5) * size / grid);
+        if (pixel.y < rows.begin || pixel.y >= rows.end) continue;
+        pixel.y -= rows.first;
+        const size_t at = size_t(pixel.y) * size_t(picture.size.x) + size_t(pixel.x);
+        if (picture.hits[at].dataset != layer.number) continue;
+        const glm::dvec3 from = layer.rays.originAt(pixel.x + 0.5, pixel.y + 0.5);
+        const glm::dvec3 along = glm::normalize(layer.rays.directionAt(pixel.x + 0.5, pixel.y + 0.5));
+        const double depth = double(picture.depth[at]) / layer.worldPerUnit;
+        const glm::dvec3 place = (from + depth * along - origin) / unit;
+        const uint64_t page = layer.scene.page(picture.hits[at].page).number;
+        constexpr double kLast = double((uint32_t{1} << frame::kLatticeBits) - 1);
+        feedback.hits.push_back({page, glm::ivec3(glm::clamp(place, 0.0, kLast)), ray});
+        feedback.passed.push_back({page, frame::kNearnessEps / (depth / rootEdge + frame::kNearnessEps)});
+    }
+    return feedback;
+}
+
+}  // namespace vcp

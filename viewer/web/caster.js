@@ -1,0 +1,30 @@
+// A worker that casts bands of pictures for the first worker (worker.js), from copies of the pages that they need.
+import { Module } from './module.js';
+
+let module;
+
+/// Does a job of the first worker's (share.js).
+function cast({ view, sample, begun, records, pages, dropped, first, count, shows }) {
+    for (const number of dropped) module.dropPage(number);
+    for (const { number, bytes } of pages) module.takePage(number, bytes);
+    module.look(view);
+    const { rows } = module.beginCopied(records, sample, begun);
+    return { ...module.castBands(view, rows, first, count, shows), said: module.said() };
+}
+
+self.onmessage = ({ data: { port } }) => {
+    port.onmessage = async ({ data }) => {
+        try {
+            if (data.type === 'follow') {
+                module = await Module.load(data.compiled);
+                module.follow(data.lead);
+                port.postMessage({ type: 'ready' });
+            } else {
+                const done = cast(data);
+                port.postMessage({ type: 'cast', ...done, memoryBytes: module.memoryBytes() }, done.pixels ? [done.pixels.buffer] : []);
+            }
+        } catch {
+            port.postMessage({ type: 'failed' }); // the first worker does without
+        }
+    };
+};
