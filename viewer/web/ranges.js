@@ -27,6 +27,15 @@ export function joined(stretches, gap, most) {
     return runs;
 }
 
+/// Returns what of stretches is in none of others.
+export function without(stretches, others) {
+    return others.reduce((left, other) => left.flatMap(({ offset, bytes }) => {
+        const end = offset + bytes, otherEnd = other.offset + other.bytes;
+        if (otherEnd <= offset || other.offset >= end) return [{ offset, bytes }];
+        return [{ offset, bytes: other.offset - offset }, { offset: otherEnd, bytes: end - otherEnd }].filter(part => part.bytes > 0);
+    }), stretches);
+}
+
 export class Ranges {
     /// `fetch`: as the browser's; another one for tests.
     constructor(url, fetch = (...all) => globalThis.fetch(...all)) {

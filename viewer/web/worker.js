@@ -1,7 +1,7 @@
 // The first worker of a viewer: fetches, decodes, chooses pages and draws, with others where there are any (share.js), so
 // that the page never waits.
 import { Module } from './module.js';
-import { Ranges, joined } from './ranges.js';
+import { Ranges, joined, without } from './ranges.js';
 import { Caster, costsOf, partsOf } from './share.js';
 
 const kLead = 64 << 10;      // bytes of the first request: header, directory and the coarsest pages
@@ -11,8 +11,8 @@ const kAtOnce = 4;           // requests
 const kFrameMs = 16; // between frames that nothing else asks for
 const kSamples = 8;          // of a pixel, where a view is at rest
 
-let module, ranges, view = null, awake = null, fetching = 0, failed = null, drawn = null, hidden = false;
-const asked = new Set(); // offsets under way
+let module, ranges, view = null, awake = null, failed = null, drawn = null, hidden = false;
+const asked = new Set(); // stretches under way
 const casters = []; // the other workers
 let plan = null; // which bands of the picture are whose
 let costs = []; // milliseconds of each band of the last picture
@@ -41,16 +41,16 @@ async function open({ url, wasm, budgetBytes }) {
 
 /// Fetches what the module misses; the loop goes on when it has come.
 function fetchMissing() {
-    for (const run of joined(module.missing(), kGap, kMostBytes)) {
-        if (fetching >= kAtOnce || asked.has(run.offset)) continue;
-        ++fetching;
-        asked.add(run.offset);
+    const underWay = [...asked];
+    // What is joined may have something between that is under way.
+    for (const run of without(joined(without(module.missing(), underWay), kGap, kMostBytes), underWay)) {
+        if (asked.size >= kAtOnce) break;
+        asked.add(run);
         ranges.read(run.offset, run.bytes)
             .then(bytes => module.supply(run.offset, bytes))
             .catch(error => { failed = error; })
             .finally(() => {
-                --fetching;
-                asked.delete(run.offset);
+                asked.delete(run);
                 wake();
             });
     }
@@ -159,7 +159,7 @@ async function run() {
             await new Promise(done => {
                 awake = done;
                 // The policy may need more frames before it lets pages go that were seen a moment ago.
-                if (!update.settled && fetching === 0) setTimeout(done, kFrameMs);
+                if (!update.settled && asked.size === 0) setTimeout(done, kFrameMs);
             });
         }
         // Messages of the page come in between.

@@ -10,7 +10,8 @@ import { compareDepth, readDepth } from './native_depth.mjs';
 
 const [web, scan, hostile, ...natives] = process.argv.slice(2);
 const { Module } = await import(pathToFileURL(path.join(web, 'module.js')));
-const { Ranges, joined, parseContentRange } = await import(pathToFileURL(path.join(web, 'ranges.js')));
+const { Ranges, joined, parseContentRange, without } = await import(pathToFileURL(path.join(web, 'ranges.js')));
+const { Caster, costsOf, partsOf } = await import(pathToFileURL(path.join(web, 'share.js')));
 const { Orbit, kFieldOfView } = await import(pathToFileURL(path.join(web, 'camera.js')));
 const wasm = fs.readFileSync(path.join(web, 'vcp.wasm'));
 const file = fs.readFileSync(scan);
@@ -90,6 +91,9 @@ await check('stretches are joined', () => {
     const far = [{ offset: 100, bytes: 10 }, { offset: 0, bytes: 10 }, { offset: 12, bytes: 4 }];
     assert.deepEqual(joined(far, 2, 1000), [{ offset: 0, bytes: 16 }, { offset: 100, bytes: 10 }]);
     assert.equal(joined(far, 2, 12).length, 3);
+    assert.deepEqual(without(far, [{ offset: 5, bytes: 100 }]), [{ offset: 105, bytes: 5 }, { offset: 0, bytes: 5 }]);
+    assert.deepEqual(without(far, []), far);
+    assert.deepEqual(without([{ offset: 0, bytes: 10 }], [{ offset: 2, bytes: 3 }]), [{ offset: 0, bytes: 2 }, { offset: 5, bytes: 5 }]);
 });
 
 await check('first picture: at most 3 requests and 400 KB', async () => {
@@ -136,6 +140,94 @@ for (const name of natives) await check(`the picture is the native one: ${name}`
     const { differ, hits } = compareDepth(cast(module), theirs, 1e-3 * info.cell);
     console.log(`   ${differ} of ${width * height} pixels differ beyond 1e-3 cell; ${hits} hits`);
     assert.ok(hits > 3000 && differ <= width * height / 1000);
+});
+
+await check('bands are shared out by what they cost', () => {
+    assert.deepEqual(partsOf([1, 1, 1, 1], 2), [{ first: 0, count: 2 }, { first: 2, count: 2 }]);
+    assert.deepEqual(partsOf([9, 1, 1, 1], 2), [{ first: 0, count: 1 }, { first: 1, count: 3 }]);
+    assert.deepEqual(partsOf([1], 3).map(part => part.count), [0, 1, 0]);
+    assert.deepEqual(costsOf([], 2), [1, 1]);
+    assert.deepEqual(costsOf([1, 2], 4), [1, 1, 2, 2]);
+    assert.deepEqual(costsOf([1, 2, 3, 4], 2), [2, 4]);
+});
+
+/// A worker that casts, in this thread.
+class CasterHere {
+    static async beside(first, shareBytes) {
+        const made = new CasterHere();
+        made.module = await Module.load(first.compiled);
+        made.module.follow(first.lead());
+        made.caster = new Caster(made, shareBytes);
+        made.onmessage({ data: { type: 'ready' } });
+        return made;
+    }
+    postMessage({ view, sample, begun, records, pages, dropped, first, count, shows }) {
+        for (const number of dropped) this.module.dropPage(number);
+        for (const { number, bytes } of pages) this.module.takePage(number, bytes);
+        this.module.look(view);
+        const { rows } = this.module.beginCopied(records, sample, begun);
+        const done = this.module.castBands(view, rows, first, count, shows);
+        setTimeout(() => this.onmessage({ data: { type: 'cast', ...done, said: this.module.said(), memoryBytes: 0 } }));
+    }
+}
+
+await check('bands cast from copies are those of the pool; no more is copied than is allowed', async () => {
+    const ranges = new Ranges('scan.vcp', server(file)), module = await opened(ranges), info = module.info();
+    const middle = info.boundsMin.map((x, i) => (x + info.boundsMax[i]) / 2), section = { normal: [1, 0, 0], offset: middle[0] };
+    const pixelsOf = (view, bands) => module.castBands(view, bands.rows, bands.first, bands.count, true).pixels;
+    let pagesLeftOut = 0, partsLeft = 0;
+    for (const shareBytes of [64 << 20, 500e3]) {
+        const other = await CasterHere.beside(module, shareBytes);
+        for (const more of [{}, { mode: 7 }, { shadows: true }, { occlusionRays: 4 }, { section }]) for (const nearer of [1, 0.3]) {
+            const orbit = new Orbit();
+            orbit.fit(info.boundsMin, info.boundsMax, 1.6);
+            orbit.zoom(nearer, 0.2, 0.3);
+            const { up, forward } = orbit.axes(), view = { eye: orbit.eye(), forward, up, fov: kFieldOfView, width: 320, height: 200, ...more };
+            module.look(view);
+            const { pagesInCut } = await settle(module, ranges, 64 << 20);
+            for (const sample of more.mode ? [0] : [0, 1]) {
+                // A sample is added to what one cast of the samples before.
+                const begun = module.beginSample(sample), { bands, rows } = begun, rest = bands - (bands >> 1);
+                const alone = pixelsOf(view, { rows, first: bands >> 1, count: rest });
+                const part = other.caster.fit(module, rows, { first: bands >> 1, count: rest });
+                partsLeft += part.count < rest ? 1 : 0;
+                if (part.count === 0) continue;
+                pagesLeftOut += pagesInCut - part.needed.list.length;
+                const done = await other.caster.cast(module, { view, sample, begun, shows: true }, part);
+                assert.deepEqual(done.pixels, alone.subarray(0, done.pixels.length), JSON.stringify({ more, nearer, sample }));
+                assert.ok(other.caster.heldBytes <= shareBytes);
+            }
+        }
+    }
+    console.log(`   ${pagesLeftOut} pages were not needed; ${partsLeft} parts were too large`);
+    assert.ok(pagesLeftOut > 0 && partsLeft > 0);
+});
+
+await check('what rays hit counts the same, whoever cast them', async () => {
+    const ranges = [0, 1].map(() => new Ranges('scan.vcp', server(file)));
+    const [alone, first] = await Promise.all(ranges.map(each => opened(each))), other = await CasterHere.beside(first, 64 << 20);
+    const orbit = new Orbit(), info = first.info();
+    orbit.fit(info.boundsMin, info.boundsMax, 1.6);
+    orbit.zoom(0.3, 0.2, 0.3);
+    const { up, forward } = orbit.axes(), view = { eye: orbit.eye(), forward, up, fov: kFieldOfView, width: 320, height: 200 };
+    alone.look(view);
+    first.look(view);
+    for (let round = 0; ; ++round) {
+        const updates = [alone.update(), first.update()];
+        assert.deepEqual(updates[0], updates[1], `round ${round}`);
+        if (updates[0].settled) break;
+        if (updates[0].drawable) {
+            cast(alone);
+            const begun = first.beginSample(0), { bands, rows } = begun;
+            const part = other.caster.fit(first, rows, { first: 2, count: bands - 2 });
+            const done = other.caster.cast(first, { view, sample: 0, begun, shows: false }, part);
+            first.castBands(view, rows, 0, 2, false);
+            first.hear((await done).said);
+            first.endSample(begun);
+        }
+        await supply(alone, ranges[0]);
+        await supply(first, ranges[1]);
+    }
 });
 
 await check('servers that do wrong end in one line', async () => {

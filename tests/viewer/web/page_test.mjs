@@ -100,6 +100,7 @@ async function looks(width, height, touch) {
     assert.equal(last.requests, asked.scan);
     assert.equal(last.bytes, asked.bytes);
     assert.ok(last.errorPixels <= 0.5 && last.samples === 8);
+    assert.ok(asked.bytes <= scan.length, 'nothing is fetched twice');
     if (scan.length <= kLead) assert.deepEqual([asked.scan, asked.bytes], [1, scan.length], 'a small scan is fetched once');
     await page.picture(path.join(pictures, `page_${width}.png`));
     await page.evaluate(`part('[data-do="more"]').click()`);
@@ -127,6 +128,41 @@ async function lights() {
     assert.deepEqual(await page.evaluate(`['side', 'above', 'axis', 'place'].map(x => part('[data-set="' + x + '"]').value)`),
         ['60', '20', '-x', '50']);
     await closeGood(page);
+}
+
+/// The picture does not depend on how many workers cast it, nor does what is fetched.
+async function shares() {
+    const kinds = ['', `viewer.setAttribute('shadows', '')`, `viewer.setAttribute('occlusion', '')`,
+        `viewer.setAttribute('section', '-x,0.5')`, `viewer.setAttribute('mode', 'level')`];
+    const pictures = [];
+    for (const workers of [1, 2, 3]) {
+        const page = await open(320, 200, { link: '' });
+        await change(page, `viewer.setAttribute('workers', ${workers}); viewer.src = 'scan.vcp?${workers}'; viewer.info = null`);
+        // The others take part from the second picture on.
+        await page.until(`viewer.info !== null`);
+        for (let i = 0; i < 100 && await page.evaluate('state.last.workers') < workers; ++i) await change(page, 'viewer.look(false)');
+        assert.equal(await page.evaluate('state.last.workers'), workers);
+        const seen = [];
+        for (const kind of kinds) {
+            await change(page, `${kind}; viewer.camera = '${kCameras.close.join(',')}'`);
+            seen.push(await shown(page));
+            await change(page, 'viewer.fit()');
+            seen.push(await shown(page));
+        }
+        pictures.push(seen);
+        await closeGood(page);
+    }
+    // One that ends while it casts is done without.
+    const page = await open(320, 200);
+    await change(page, `viewer.setAttribute('workers', 2); viewer.src = 'scan.vcp?lost'`);
+    for (let i = 0; i < 100 && await page.evaluate('state.last.workers') < 2; ++i) await change(page, 'viewer.look(false)');
+    await change(page, `viewer.camera = '${kCameras.close.join(',')}'; viewer.look(false);
+        viewer.casters[0].terminate(); viewer.casters[0].onerror(new Event('error'))`);
+    assert.equal(await page.evaluate('state.last.workers'), 1);
+    assert.equal(await shown(page), pictures[0][0]);
+    await closeGood(page);
+    for (const other of pictures.slice(1)) other.forEach((picture, i) => assert.equal(picture, pictures[0][i], kinds[i >> 1]));
+    assert.equal(new Set(pictures[0]).size, pictures[0].length, 'each shows something else');
 }
 
 const kCameras = { whole: [0, 0.86, 0, 8, 0.5, 0.4], close: [0, 1.1, 0, 1.6, 0.3, 0.35] };
@@ -290,8 +326,9 @@ async function crosses() {
 
 /// Views at random with less memory than the scan takes: each settles, the budget holds, and memory does not grow.
 async function wanders() {
+    // Another worker gets a third of the budget.
     const page = await open(320, 200), budget = 2.5 * 2 ** 20;
-    await change(page, `viewer.setAttribute('budget', ${budget / 2 ** 20}); viewer.src = 'scan.vcp?anew'; state.most = 0;
+    await change(page, `viewer.setAttribute('budget', ${1.5 * budget / 2 ** 20}); viewer.setAttribute('workers', 2); viewer.src = 'scan.vcp?anew'; state.most = 0;
         addEventListener('progress', event => {
             state.most = Math.max(state.most, event.detail.residentBytes);
             state.relaxed ||= event.detail.relaxed;
@@ -311,6 +348,7 @@ async function wanders() {
     }
     const most = await page.evaluate('state.most');
     console.log(`40 views: at most ${most} bytes of ${budget}; ${memory[19]} bytes of memory after 20, ${memory[39]} after 40`);
+    assert.equal(await page.evaluate('state.last.workers'), 2);
     assert.ok(most > 0 && most <= budget && await page.evaluate('state.relaxed'));
     assert.ok(memory[39] <= memory[19] * 1.25);
     await closeGood(page);
@@ -344,6 +382,7 @@ else {
     await lights();
     if (scan.length > kLead) {
         for (const name of Object.keys(kCameras)) await measures(name, 320, 200);
+        await shares();
         await moves();
         await annotates();
         await returns();

@@ -1,5 +1,6 @@
 #include "viewer/web/wasm/fetched_bytes.h"
 
+#include <algorithm>
 #include <cstring>
 #include <utility>
 
@@ -21,14 +22,26 @@ Result<void> FetchedBytes::read(uint64_t offset, std::span<std::byte> bytes) con
     if (offset > size_ || bytes.size() > size_ - offset)
         return Error{
             .code = ErrorCode::Io, .message = "the file ends here; it was truncated", .file = name_, .byte = offset};
-    for (const Piece& piece : pieces_) {
-        if (offset < piece.offset || offset - piece.offset > piece.bytes.size() ||
-            bytes.size() > piece.bytes.size() - (offset - piece.offset))
-            continue;
-        std::memcpy(bytes.data(), piece.bytes.data() + (offset - piece.offset), bytes.size());
-        return {};
+    const uint64_t end = offset + bytes.size();
+    bool isWhole = true;
+    for (uint64_t at = offset; at < end;) {
+        // The bytes may lie in several pieces, with or without gaps between them.
+        uint64_t until = at, next = end;
+        for (const Piece& piece : pieces_) {
+            const uint64_t pieceEnd = piece.offset + piece.bytes.size();
+            if (piece.offset > at) next = std::min(next, piece.offset);
+            if (piece.offset > at || pieceEnd <= at || until > at) continue;
+            until = std::min(end, pieceEnd);
+            std::memcpy(bytes.data() + (at - offset), piece.bytes.data() + (at - piece.offset), until - at);
+        }
+        if (until == at) {
+            missing_.push_back({at, next - at});
+            isWhole = false;
+            until = next;
+        }
+        at = until;
     }
-    missing_.push_back({offset, bytes.size()});
+    if (isWhole) return {};
     return Error::cancelled(name_);
 }
 
