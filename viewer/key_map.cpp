@@ -34,6 +34,7 @@ constexpr KeyHelp kKeyMap[] = {
     {KeyGroup::Look, "I", "inset: where the picture still misses detail"},
     {KeyGroup::Measure, "D", "measure: click points; Enter ends a line, Backspace takes a point back"},
     {KeyGroup::Measure, "N", "annotate: click a point, write its title and its text"},
+    {KeyGroup::Measure, "K", "compare: one surface's distance from another as colours, or its own again"},
     {KeyGroup::Measure, "Ctrl+E", "write what is measured: measurement-1.csv, .json"},
     {KeyGroup::Save, "Ctrl+S", "save the picture: picture-1.png, of the size chosen in the panel"},
     {KeyGroup::Save, "Ctrl+T", "save a turntable: turntable-1/picture-0001.png and so on, as chosen in the panel"},

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include <fmt/format.h>
+#include <glm/common.hpp>
 
 #include "render/false_colours.h"
 
@@ -39,6 +40,11 @@ Legend levels(const std::vector<uint32_t>& counts) {
 glm::vec3 Legend::colourOf(double number) const { return falseColour(number / (end > 0 ? end : 1)); }
 
 glm::vec3 Legend::colourAt(double part) const {
+    if (!colours.empty()) {
+        const double at = std::clamp(part, 0.0, 1.0) * double(colours.size() - 1);
+        const size_t before = std::min(size_t(at), colours.size() - 2);
+        return glm::mix(colours[before], colours[before + 1], float(at - double(before)));
+    }
     if (bands == 0) return colourOf(part * end);
     return colourOf(std::clamp(std::floor(part * bands), 0.0, double(bands - 1)));
 }

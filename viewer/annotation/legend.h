@@ -22,9 +22,11 @@ struct Legend {
     double end = 1;                 ///< number at the bar's right end; where there are bands, the last band's
     uint32_t bands = 0;             ///< so many numbers, from 0 on, with one colour each; 0: colours go smoothly
     std::vector<LegendTick> ticks;  ///< from left to right
+    /// Colours of the bar, sRGB, evenly from its left to its right end, at least two; empty: those of falseColour.
+    std::vector<glm::vec3> colours = {};
 
     [[nodiscard]] std::string title() const { return unit.empty() ? name : name + ", " + unit; }
-    /// Returns the colour of a number, as pictures have it.
+    /// Returns the colour of a number, as pictures in false colours have it.
     [[nodiscard]] glm::vec3 colourOf(double number) const;
     /// Returns the colour at a part of the bar, 0 to 1.
     [[nodiscard]] glm::vec3 colourAt(double part) const;

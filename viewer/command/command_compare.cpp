@@ -12,6 +12,7 @@
 #include "viewer/command/source_arguments.h"
 #include "viewer/command/terminal/interrupt.h"
 #include "viewer/export/deviation_picture.h"
+#include "viewer/export/deviation_report.h"
 #include "viewer/export/surface_mesh.h"
 #include "viewer/scene/inputs.h"
 #include "viewer/scene/option_values.h"
@@ -19,10 +20,6 @@
 namespace vcp {
 
 namespace {
-
-constexpr size_t kBins = 60;
-constexpr std::pair<const char*, double> kQuantiles[] = {{"p1", 0.01},  {"p5", 0.05},  {"p25", 0.25}, {"p50", 0.5},
-                                                         {"p75", 0.75}, {"p95", 0.95}, {"p99", 0.99}};
 
 struct CompareCommand {
     std::vector<std::string> inputs;
@@ -60,15 +57,15 @@ public:
         display_.update("sorting the second", 0.2);
         const DeviationTarget target(b_.mesh);
         VCP_TRY_ASSIGN(const auto deviation, measure(a_.mesh, target, {"measuring", 0.3, 0.5}));
-        range_ = rangeOf(deviation);
-        Json json = toJson(deviation, "a_to_b");
+        range_ = command_.range ? lengthOf(*command_.range) : usualRange(deviation, diagonal_);
+        Json json = deviationJson(deviation, compared(), "a_to_b");
         std::string text = table(deviation);
         VCP_TRY(writeCsv(deviation));
         VCP_TRY(writeOutputs(target, deviation, bounds));
         if (command_.both) {
             const DeviationTarget other(a_.mesh);
             VCP_TRY_ASSIGN(const auto back, measure(b_.mesh, other, {"measuring back", 0.9, 1}));
-            json.update(toJson(back, "b_to_a"));
+            json.update(deviationJson(back, compared(), "b_to_a"));
             text += "\n  and back\n" + table(back);
         }
         display_.finish();
@@ -149,35 +146,13 @@ private:
             {.samples = command_.samples, .within = within_, .threads = command_.threads, .progress = progress(stage)});
     }
 
-    /// Returns the distance at the ends of colours and histogram: that which 99 % of the distances do not exceed.
-    [[nodiscard]] double rangeOf(const Deviation& deviation) const {
-        if (command_.range) return lengthOf(*command_.range);
-        const double most = deviation.absoluteQuantile(0.99);
-        return most > 0 ? most : std::max(diagonal_ * 1e-6, 1e-300);
-    }
-
-    [[nodiscard]] Json toJson(const Deviation& d, const std::string& name) const {
-        const DeviationHistogram histogram = histogramOf(d, range_, kBins);
-        Json figures = {{"mean", d.mean}, {"rms", d.rms}, {"mean_absolute", d.meanAbsolute}};
-        for (const auto& [word, part] : kQuantiles) figures[word] = d.quantile(part);
-        figures["min"] = d.distances.front();
-        figures["max"] = d.distances.back();
-        figures["absolute_p50"] = d.absoluteQuantile(0.5);
-        figures["absolute_p95"] = d.absoluteQuantile(0.95);
-        figures["absolute_p99"] = d.absoluteQuantile(0.99);
-        figures["absolute_max"] = d.absoluteQuantile(1);
-        figures["samples"] = d.samples;
-        figures["without_counterpart"] = d.withoutCounterpart();
-        figures["histogram"] = {{"range", histogram.range},
-                                {"counts", histogram.counts},
-                                {"below", histogram.below},
-                                {"above", histogram.above}};
-        return {{"a", command_.inputs[0]},
-                {"b", command_.inputs[1]},
-                {"unit", command_.unit ? Json(command_.unit->name) : Json()},
-                {"certified_a", a_.certified},
-                {"certified_b", b_.certified},
-                {name, figures}};
+    [[nodiscard]] ComparedSurfaces compared() const {
+        return {.a = command_.inputs[0],
+                .b = command_.inputs[1],
+                .unit = command_.unit ? std::string(command_.unit->name) : "",
+                .certifiedA = a_.certified,
+                .certifiedB = b_.certified,
+                .range = range_};
     }
 
     [[nodiscard]] std::string heading() const {
@@ -192,7 +167,8 @@ private:
         std::string text = fmt::format("  {:<10}{}{}\n  {:<10}{}{}\n", "mean", formatLength(d.mean), unit, "rms",
                                        formatLength(d.rms), unit);
         text += "  signed    ";
-        for (const auto& [word, part] : kQuantiles) text += fmt::format(" {} {}", word, formatLength(d.quantile(part)));
+        for (const auto& [word, part] : kDeviationQuantiles)
+            text += fmt::format(" {} {}", word, formatLength(d.quantile(part)));
         text +=
             fmt::format("\n  size       p50 {} p95 {} p99 {} max {}\n  {:<10}{}", formatLength(d.absoluteQuantile(0.5)),
                         formatLength(d.absoluteQuantile(0.95)), formatLength(d.absoluteQuantile(0.99)),
@@ -202,24 +178,9 @@ private:
         return text;
     }
 
-    /// Writes a row for each figure and each bin: what it is, the bin's ends, the value.
-    [[nodiscard]] Result<void> writeCsv(const Deviation& d) const {
+    [[nodiscard]] Result<void> writeCsv(const Deviation& deviation) const {
         if (command_.csv.empty()) return {};
-        std::string text = "quantity,from,to,value\n";
-        const auto figure = [&](const char* name, double value) { text += fmt::format("{},,,{}\n", name, value); };
-        figure("mean", d.mean);
-        figure("rms", d.rms);
-        figure("mean_absolute", d.meanAbsolute);
-        for (const auto& [word, part] : kQuantiles) figure(word, d.quantile(part));
-        figure("min", d.distances.front());
-        figure("max", d.distances.back());
-        text += fmt::format("samples,,,{}\nwithout_counterpart,,,{}\n", d.samples, d.withoutCounterpart());
-        const DeviationHistogram h = histogramOf(d, range_, kBins);
-        text += fmt::format("count,,{},{}\n", -h.range, h.below);
-        for (size_t i = 0; i < kBins; ++i)
-            text += fmt::format("count,{},{},{}\n", h.lowerEnd(i), h.lowerEnd(i) + h.binWidth(), h.counts[i]);
-        text += fmt::format("count,{},,{}\n", h.range, h.above);
-        return writeFile(command_.csv, OutputKind::Text, std::string_view(text), rules());
+        return writeFile(command_.csv, OutputKind::Text, std::string_view(deviationCsv(deviation, range_)), rules());
     }
 
     Result<void> writeOutputs(const DeviationTarget& target, const Deviation& deviation, const Box& bounds) {

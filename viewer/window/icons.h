@@ -11,6 +11,7 @@ inline constexpr const char* kLight = "\xef\x96\xa8";         // U+F5A8 white-ba
 inline constexpr const char* kCut = "\xef\x86\x90";           // U+F190 content-cut
 inline constexpr const char* kMeasure = "\xef\x91\xad";       // U+F46D ruler
 inline constexpr const char* kAnnotate = "\xef\x8d\x8e";      // U+F34E map-marker
+inline constexpr const char* kCompare = "\xef\x93\xa2";       // U+F4E2 swap-vertical
 inline constexpr const char* kEdit = "\xef\x8f\xab";          // U+F3EB pencil
 inline constexpr const char* kLayers = "\xef\x8c\xa8";        // U+F328 layers
 inline constexpr const char* kDetails = "\xef\x8b\xbd";       // U+F2FD information-outline

@@ -84,6 +84,12 @@ std::vector<Interface::Tool> Interface::tools() {
          !viewer.sections().empty(),
          true,
          acts(ViewerAction::ToggleSection)},
+        {icon::kCompare,
+         "Compare",
+         {"Compare: how far a surface lies from another", "K"},
+         session->comparison() != nullptr,
+         true,
+         [this] { toggleComparison(); }},
         {},
         {icon::kShadows, "Shadows", {"Shadows", "S"}, shading.shadows, false, acts(ViewerAction::ToggleShadows)},
         {icon::kOcclusion,
@@ -351,6 +357,7 @@ void Interface::toggleHelp() {
 
 void Interface::openFileList() {
     page_ = Page::Files;
+    comparesFile_ = false;
     typed_.clear();
     files_.read(files_.folder().empty() ? std::filesystem::path(".") : files_.folder());
 }

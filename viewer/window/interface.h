@@ -1,9 +1,9 @@
 // The panels over the picture: toolbar, status bar, panel, toasts, welcome page, file list, keys, scale bar, measured
 // lines, progress; laid out with Dear ImGui. A click acts on the session at once.
 //
-// interface.cpp has the bars and toasts, interface_panel.cpp the panel, interface_pages.cpp what covers the picture for
-// a while, interface_overlays.cpp what is drawn over it. Used between InterfacePainter::begin and end, in the same
-// thread.
+// interface.cpp has the bars and toasts, interface_panel.cpp the panel, interface_compare.cpp its section that
+// compares, interface_pages.cpp what covers the picture for a while, interface_overlays.cpp what is drawn over it. Used
+// between InterfacePainter::begin and end, in the same thread.
 #pragma once
 
 #include <functional>
@@ -59,6 +59,8 @@ public:
     void savePicture();
     void saveTurntable();
     void savePath();
+    /// Compares the first two datasets; asks for a file where there is one; ends the comparison that is shown.
+    void toggleComparison();
 
 private:
     enum class Page { None, Help, Files, Point };
@@ -86,6 +88,13 @@ private:
     void layOutMeasuring();
     void layOutMeasuredLine(size_t number);
     void layOutPoints();
+    void layOutCompare();
+    void layOutCompared();
+    void drawDistances(const Deviation& deviation, double range) const;
+    [[nodiscard]] bool canCompare() const;
+    [[nodiscard]] std::vector<uint32_t> scansShownFirst() const;
+    /// Opens the file list for what a dataset is compared with.
+    void chooseCompared(uint32_t dataset);
     void layOutLayers();
     void layOutDataset(uint32_t dataset);
     void layOutSave();
@@ -139,6 +148,12 @@ private:
     size_t point_ = 0;         // that is written
     bool writesText_ = false;  // and not its title
     FileList files_;
+    bool comparesFile_ = false;     // what is chosen there is compared, not opened
+    uint32_t comparesDataset_ = 0;  // with that dataset
+    int compared_[2] = {0, 1};      // chosen in the panel
+    float rangeDragged_ = 0;        // of a comparison, as a power of ten of the largest distance
+    bool isDraggingRange_ = false;
+    bool wasCompared_ = false;   // when the panel was laid out last
     bool showsDetails_ = false;  // opened by the status bar
     int pictureSize_ = 0;        // index in kPictureSizes
     PictureChoice picture_;

@@ -154,6 +154,7 @@ void Interface::enter(const FileList::Entry& entry) {
     typed_.clear();
     if (entry.isFolder) return files_.read(path);
     closePage();
+    if (comparesFile_) return session_->compareWithFile(comparesDataset_, path.string());
     host_.open({path.string()});
 }
 
@@ -213,7 +214,8 @@ void Interface::enterTyped() {
 }
 
 void Interface::layOutFiles() {
-    layOutPage("Open a file", "Type to search this folder", kFilesWidth, kFilesHeight, &Interface::layOutFolder);
+    layOutPage(comparesFile_ ? "Compare with a file" : "Open a file", "Type to search this folder", kFilesWidth,
+               kFilesHeight, &Interface::layOutFolder);
 }
 
 void Interface::openDemo() {
@@ -318,7 +320,8 @@ void Interface::layOutSaving(const ViewSession::SavingProgress& saving) {
     const float width = ImGui::GetContentRegionAvail().x;
     const std::string count =
         saving.pictures > 1 ? fmt::format("{} of {} pictures", saving.finished, saving.pictures) : std::string();
-    valueRow(*look_, fitted("Saving " + saving.name, 0.5f * width).c_str(),
+    const std::string what = saving.name.empty() ? "Comparing" : "Saving " + saving.name;
+    valueRow(*look_, fitted(what, 0.5f * width).c_str(),
              count.empty() ? fmt::format("{:.0f} %", 100 * saving.fraction) : count);
     progressBar(*look_, saving.fraction);
     if (textButton(*look_, icon::kClose, "Cancel", {"", "Esc"})) session_->cancelSaving();

@@ -60,8 +60,15 @@ void Interface::layOutPanel() {
     ImGui::GetWindowDrawList()->AddLine({size_.x - panelWidth_ + 0.5f, toolbarHeight_},
                                         {size_.x - panelWidth_ + 0.5f, size_.y - statusHeight_}, look_->palette.line,
                                         units(1));
+    const bool begins = session_->comparison() && !wasCompared_;
+    wasCompared_ = session_->comparison() != nullptr;
     const auto section = [&](const char* sign, const char* name, bool isOpenAtFirst, void (Interface::*layOutRest)()) {
         ImGui::PushID(name);
+        // What has just been compared is to be seen.
+        if (begins && layOutRest == &Interface::layOutCompare) {
+            ImGui::GetStateStorage()->SetBool(ImGui::GetID(name), true);
+            ImGui::SetScrollHereY(0);
+        }
         if (sectionHead(*look_, sign, name, isOpenAtFirst)) {
             (this->*layOutRest)();
             ImGui::Dummy({0, units(4)});
@@ -76,6 +83,7 @@ void Interface::layOutPanel() {
     section(icon::kCut, "Cut", true, &Interface::layOutCut);
     section(icon::kMeasure, "Measure", true, &Interface::layOutMeasuring);
     section(icon::kAnnotate, "Annotate", false, &Interface::layOutPoints);
+    section(icon::kCompare, "Compare", false, &Interface::layOutCompare);
     section(icon::kLayers, "Layers", false, &Interface::layOutLayers);
     section(icon::kPicture, "Save", false, &Interface::layOutSave);
     section(icon::kDetails, "Details", false, &Interface::layOutLimits);
@@ -329,9 +337,10 @@ void Interface::layOutSave() {
     switchRow(*look_, "No background", picture_.transparent, {"What is not hit is transparent", ""});
     switchRow(*look_, "Depth as well", picture_.depth, {"Distances along the rays, as .pfm", ""});
     bool annotates = annotatesPictures();
-    if (switchRow(
-            *look_, "Scale, measures, titles, legend", annotates,
-            {"Written over what is saved, as over the window; by itself where something is measured or annotated", ""}))
+    if (switchRow(*look_, "Scale, measures, titles, legend", annotates,
+                  {"Written over what is saved, as over the window; by itself where something is measured, annotated "
+                   "or compared",
+                   ""}))
         annotatesPictures_ = annotates;
     ImGui::BeginDisabled(session_->saving().has_value());
     if (textButton(*look_, icon::kPicture, "Save the picture", {"picture-1.png in the working folder", "Ctrl+S"}, -1))
@@ -410,7 +419,8 @@ PictureChoice Interface::pictureChosen() const {
 }
 
 bool Interface::annotatesPictures() const {
-    return annotatesPictures_.value_or(!session_->measurement().empty() || !session_->points().empty());
+    return annotatesPictures_.value_or(!session_->measurement().empty() || !session_->points().empty() ||
+                                       session_->comparison());
 }
 
 void Interface::savePicture() { session_->savePicture(pictureChosen()); }

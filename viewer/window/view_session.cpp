@@ -13,6 +13,7 @@
 #include "octree/io/output_file.h"
 #include "viewer/annotation/picture_canvas.h"
 #include "viewer/camera/camera_path.h"
+#include "viewer/window/free_name.h"
 #include "viewer/window/theme.h"
 #include "viewer/window/thumbnails.h"
 
@@ -27,26 +28,7 @@ constexpr double kNoteSeconds = 8;
 constexpr const char* kErrorUnknown =
     "not measured: nothing is known of the error of this surface's method (see docs/mesostructure.md)";
 
-constexpr int kMostExports = 10000;
 constexpr uint32_t kSavedTile = 512;  // small, so that the window stays live between tiles
-
-/// Returns the first number from 1 on that is free; where there are too many, the last.
-template <class IsTaken>
-int freeNumber(IsTaken isTaken) {
-    int number = 1;
-    while (number < kMostExports && isTaken(number)) ++number;
-    return number;
-}
-
-bool isThere(const std::filesystem::path& path) {
-    std::error_code failed;
-    return std::filesystem::exists(path, failed);
-}
-
-std::string workingFolder() {
-    std::error_code failed;
-    return std::filesystem::current_path(failed).string();
-}
 
 /// Returns what is shown as a scene names it: a mesh as such, not what was built of it. What no scene can name has no
 /// name.
@@ -115,10 +97,10 @@ void ViewSession::open(std::vector<std::string> inputs) {
 
 void ViewSession::takeOpened() {
     if (!opening_ || !opening_->isDone()) return;
-    const auto opened = opening_->take();
+    auto opened = opening_->take();
     const std::vector<std::string> inputs = opening_->inputs();
     opening_.reset();
-    const auto shown = opened ? show(*opened, inputs) : Result<void>(opened.error());
+    const auto shown = opened ? show(*std::move(opened), inputs) : Result<void>(opened.error());
     if (shown) return;
     if (shown.error().code == ErrorCode::Cancelled)
         note("cancelled");
@@ -126,7 +108,7 @@ void ViewSession::takeOpened() {
         say(shown.error().line());
 }
 
-Result<void> ViewSession::show(const OpenedScene& open, const std::vector<std::string>& inputs) {
+Result<void> ViewSession::show(OpenedScene open, const std::vector<std::string>& inputs) {
     const glm::ivec2 size = glm::max(viewer_->size(), glm::ivec2(1));
     OrbitCamera camera;
     camera.up = up_;
@@ -156,6 +138,7 @@ Result<void> ViewSession::show(const OpenedScene& open, const std::vector<std::s
         viewer_->setShading(shading);
     }
     cancelSaving();
+    compared_.reset();
     endPick();
     measurement_.clear();
     finest_ = std::make_shared<ScenePick>();
@@ -181,6 +164,8 @@ Result<void> ViewSession::show(const OpenedScene& open, const std::vector<std::s
     const auto kept = user_.annotations.find(shown_);
     points_ = kept != user_.annotations.end() ? kept->second : open.file.annotations;
     newPoint_.reset();
+    home_ = camera;
+    open_ = std::move(open);
     for (const std::string& input : inputs) {
         changes_.opened.push_back(rememberedName(input));
         user_.remember(changes_.opened.back());
@@ -205,9 +190,10 @@ Result<NextStep> ViewSession::update(double now) {
     takePicked();
     goOnSaving();
     takeCut();
+    takeCompared();
     noteChanges();
     // What is saved or built has the processors and the device for itself.
-    viewer_->setSamples(saving_ || opening_ ? 1 : options_.samples);
+    viewer_->setSamples(saving_ || opening_ || comparing_ ? 1 : options_.samples);
     auto next = viewer_->update(now);
     if (!next) return next;
     if (!note_.empty()) {
@@ -218,7 +204,7 @@ Result<NextStep> ViewSession::update(double now) {
     }
     if (opening_) next->waitSeconds = std::min(next->waitSeconds, kOpeningPollSeconds);
     if (saving_) next->waitSeconds = saving_->pictures->isWaiting() ? std::min(next->waitSeconds, kPickPollSeconds) : 0;
-    if (cut_) next->waitSeconds = std::min(next->waitSeconds, kOpeningPollSeconds);
+    if (cut_ || comparing_) next->waitSeconds = std::min(next->waitSeconds, kOpeningPollSeconds);
     if (pick_.valid()) next->waitSeconds = std::min(next->waitSeconds, kPickPollSeconds);
     return next;
 }
@@ -237,7 +223,8 @@ void ViewSession::note(std::string text) {
 }
 
 void ViewSession::keepThumbnail() {
-    if (shown_.empty() || !viewer_->isOpen() || !viewer_->status().update.drawable || viewer_->framesDrawn() == 0)
+    if (shown_.empty() || compared_ || !viewer_->isOpen() || !viewer_->status().update.drawable ||
+        viewer_->framesDrawn() == 0)
         return;
     const auto picture = viewer_->renderer().readPicture();
     if (!picture || picture->rgba.empty()) return;
@@ -365,7 +352,8 @@ void ViewSession::saveScene() {
     scene.sectionCaps = viewer_->sectionCaps();
     scene.annotations = points_;
     for (size_t i = 0; i < scene.datasets.size(); ++i) {
-        const DatasetLook look = viewer_->lookOf(uint32_t(i));
+        const DatasetLook look =
+            compared_ && compared_->shown.dataset == i ? compared_->look : viewer_->lookOf(uint32_t(i));
         scene.datasets[i].opacity = look.opacity;
         scene.datasets[i].colour.reset();
         if (look.colour) scene.datasets[i].colour = glm::pow(*look.colour, glm::vec3(1 / 2.2f));
@@ -383,6 +371,9 @@ Annotations ViewSession::annotations() const {
         if (!std::ranges::count(viewer_->hidden(), uint32_t(i))) shown.levels.push_back(subject_.levels[i]);
     Annotations all{
         .legends = legendsOf(viewer_->shading().mode, shown), .hasScaleBar = true, .lines = {}, .unit = unit()};
+    const ShadingMode mode = viewer_->shading().mode;
+    if (compared_ && (mode == ShadingMode::Lit || mode == ShadingMode::Unlit))
+        all.legends.push_back(distanceLegend(compared_->shown.range, compared_->shown.measured->compared.b, unit()));
     all.lines = annotatedLines(measurement_, unit());
     all.points = points_;
     return all;
@@ -497,6 +488,7 @@ void ViewSession::takeCut() {
 
 std::optional<ViewSession::SavingProgress> ViewSession::saving() const {
     if (cut_) return SavingProgress{cut_->output().string(), cut_->fraction(), 0, 1};
+    if (comparing_) return SavingProgress{{}, comparing_->fraction(), 0, 1};
     if (!saving_) return std::nullopt;
     const PictureSequence& pictures = *saving_->pictures;
     return SavingProgress{saving_->name.string(), pictures.fraction(), pictures.finished(), pictures.pictures()};
@@ -521,6 +513,8 @@ void ViewSession::cancelSaving() {
     if (saving_) note("cancelled; " + endSaving());
     if (cut_) note(fmt::format("cancelled; {}: nothing is written", cut_->output().string()));
     cut_.reset();
+    if (comparing_) note("cancelled; nothing is compared");
+    comparing_.reset();
 }
 
 void ViewSession::goOnSaving() {

@@ -20,6 +20,7 @@
 #include "viewer/scene/render_settings.h"
 #include "viewer/scene/scene_opening.h"
 #include "viewer/viewer.h"
+#include "viewer/window/comparison.h"
 #include "viewer/window/cut_drawing.h"
 #include "viewer/window/measurement.h"
 #include "viewer/window/mesh_preview.h"
@@ -158,14 +159,34 @@ public:
     /// Saves the lines in which the section plane cuts what is shown, as a drawing: cut-1.svg (or .dxf, as `extension`
     /// says) in the working folder, or the next free number. Reports where there is no plane, or not one scan alone.
     void saveCut(const std::string& extension);
+
+    /// Colours a dataset by its distance from another one, or from a file: a .vcp, or a mesh. The other one is hidden
+    /// meanwhile. Does nothing while something is saved or compared. A problem is reported, and changes nothing.
+    void compare(uint32_t dataset, uint32_t with);
+    void compareWithFile(uint32_t dataset, const std::string& file);
+    /// What is compared: the figures, and the colours that are shown.
+    struct ShownComparison {
+        uint32_t dataset = 0;
+        std::shared_ptr<const Comparison::Measured> measured;
+        double range = 1;  ///< the distance at both ends of the colours, world units
+    };
+    /// Returns the comparison that is shown; null without one.
+    [[nodiscard]] const ShownComparison* comparison() const { return compared_ ? &compared_->shown : nullptr; }
+    /// Colours what is compared anew, with another distance, above 0, at both ends of the colours.
+    void setComparisonRange(double range);
+    /// Shows the dataset as it was before, in its own colours.
+    void endComparison();
+    /// Writes deviation-1.json and .csv into the working folder, or the next free number, and reports it.
+    void exportComparison();
+
     struct SavingProgress {
-        std::string name;  ///< name of the file or folder
+        std::string name;  ///< name of the file or folder; empty: surfaces are compared
         double fraction;   ///< 0 to 1
         size_t finished, pictures;
     };
-    /// Returns the progress; nothing where nothing is being saved.
+    /// Returns the progress; nothing where nothing is being saved or compared.
     [[nodiscard]] std::optional<SavingProgress> saving() const;
-    /// Stops saving. Finished pictures of a sequence stay; a half-written one does not.
+    /// Stops saving or comparing. Finished pictures of a sequence stay; a half-written one does not.
     void cancelSaving();
 
 private:
@@ -188,7 +209,7 @@ private:
     [[nodiscard]] bool isPreviewMoved() const { return framed_ && viewer_->camera().current() != *framed_; }
     void annotate(glm::dvec3 position);
     void keepPoints();
-    Result<void> show(const OpenedScene& open, const std::vector<std::string>& inputs);
+    Result<void> show(OpenedScene open, const std::vector<std::string>& inputs);
     void takePicked();
     void endPick();
     void saveSequence(const PictureChoice& choice, const std::string& name, const std::vector<OrbitCamera>& cameras);
@@ -196,6 +217,10 @@ private:
                      const std::vector<OrbitCamera>& cameras, bool isFolder);
     void goOnSaving();
     void takeCut();
+    void beginComparing(uint32_t dataset, std::optional<uint32_t> with, Comparison::Subject other);
+    void takeCompared();
+    Result<void> showCompared(Comparison::Coloured coloured);
+    Result<void> replaceDatasets(std::vector<PlacedDataset> datasets);
     [[nodiscard]] std::string endSaving();
 
     SessionOptions options_;
@@ -212,6 +237,8 @@ private:
     std::string problem_, note_;
     double notedAt_;  // time of the update that saw the note first; not a number until then
     std::vector<Layer> layers_;
+    OpenedScene open_;       // what is shown, but for a comparison
+    OrbitCamera home_;       // the camera that it opened with
     LegendSubject subject_;  // all that is open, in the order of Viewer::hidden()
     Measurement measurement_;
     Clicks clicks_ = Clicks::Nothing, pickedFor_ = Clicks::Nothing;
@@ -230,6 +257,17 @@ private:
     std::optional<Saving> saving_;
     std::unique_ptr<CutDrawing> cut_;
     std::vector<CutDrawing::Subject> scans_;  // what is shown, without a plane
+    std::unique_ptr<Comparison> comparing_;
+    uint32_t comparesDataset_ = 0;          // that comparing_ is of
+    std::optional<uint32_t> comparesWith_;  // the dataset that it is compared with, which is hidden then
+    struct Compared {
+        ShownComparison shown;
+        // What was shown before, for the way back.
+        ShadingMode mode = ShadingMode::Lit;
+        std::vector<uint32_t> hidden;
+        DatasetLook look;
+    };
+    std::optional<Compared> compared_;
 };
 
 }  // namespace vcp

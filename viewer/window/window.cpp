@@ -360,6 +360,9 @@ private:
             case GLFW_KEY_N:
                 session_->toggleClicks(ViewSession::Clicks::Annotate);
                 break;
+            case GLFW_KEY_K:
+                interface_.toggleComparison();
+                break;
             case GLFW_KEY_ENTER:
                 session_->measurement().finishLine();
                 break;

@@ -17,6 +17,7 @@
 #include "render/picture.h"
 #include "tests/support/built_ball.h"
 #include "tests/support/encoder_in_path.h"
+#include "tests/support/viewed_ball.h"
 #include "viewer/camera/orbit_camera.h"
 #include "viewer/window/window.h"
 
@@ -28,68 +29,7 @@ namespace fs = std::filesystem;
 constexpr PictureChoice kSmall{.size = {64, 48}};
 constexpr PictureChoice kTwoTiles{.size = {600, 32}};
 
-class ViewSessionTest : public BuiltBall {
-protected:
-    /// A working folder of the test's own, and the ball in a session.
-    void SetUp() override {
-        if (!listDevices()) GTEST_SKIP() << "no Vulkan device";
-        before_ = fs::current_path();
-        fs::create_directory(*folder_ / "work");
-        fs::current_path(*folder_ / "work");
-        SessionOptions options;
-        options.render.budgetBytes = 64 << 20;
-        auto session = ViewSession::create(options, {});
-        ASSERT_TRUE(session) << session.error().line();
-        session_ = *std::move(session);
-        session_->viewer().resize({96, 64});
-        session_->open({(*folder_ / "ball.vcp").string()});
-        ASSERT_TRUE(
-            turnUntil([&] { return session_->viewer().dataset() && session_->viewer().status().update.settled; }));
-    }
-    void TearDown() override {
-        session_.reset();
-        if (!before_.empty()) fs::current_path(before_);
-        fs::remove_all(*folder_ / "work");
-    }
-
-    /// One turn of the window's loop.
-    void turn() {
-        const auto next = session_->update(now_ += 0.02);
-        ASSERT_TRUE(next) << next.error().line();
-        if (next->draw) {
-            ASSERT_TRUE(session_->viewer().draw());
-        }
-        if (next->waitSeconds > 0) std::this_thread::sleep_for(std::chrono::milliseconds(1));
-    }
-    bool turnUntil(const std::function<bool()>& isDone) {
-        for (int i = 0; i < 10000 && !HasFatalFailure(); ++i) {
-            if (isDone()) return true;
-            turn();
-        }
-        return false;
-    }
-    bool isSaved() {
-        return turnUntil([&] { return !session_->saving(); }) && session_->problem().empty();
-    }
-    /// Goes elsewhere at once.
-    void orbit(double yaw) {
-        OrbitCamera camera = session_->viewer().camera();
-        camera.orbit(session_->viewer().bounds().centre(), yaw, 0.2);
-        session_->viewer().setCamera(camera);
-    }
-
-    static std::set<std::string> filesIn(const fs::path& path) {
-        std::set<std::string> names;
-        for (const fs::directory_entry& each : fs::directory_iterator(path))
-            names.insert(each.path().filename().string());
-        return names;
-    }
-    static Picture picture(const fs::path& path) { return readPng(path).value(); }
-
-    fs::path before_;
-    std::unique_ptr<ViewSession> session_;
-    double now_ = 0;
-};
+class ViewSessionTest : public ViewedBall {};
 
 /// Sessions that remember, as vcp view has them: each reads the settings when it begins, and saves what was changed.
 class RememberingSessionTest : public BuiltBall {
