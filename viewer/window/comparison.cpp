@@ -12,6 +12,7 @@
 #include "builder/build.h"
 #include "octree/io/caught.h"
 #include "viewer/export/diverging_colours.h"
+#include "viewer/export/short_edges.h"
 #include "viewer/export/surface_mesh.h"
 #include "viewer/scene/mesh_cache.h"
 
@@ -26,6 +27,8 @@ constexpr uint64_t kMostTriangles = 12'000'000;
 // Leaves of triangles have up to 16, some 9 in the mean; slabs are cut into some 3.
 constexpr uint64_t kTrianglesALeaf = 9, kTrianglesASlab = 3;
 
+// A picture of a surface is some such number of colours long.
+constexpr double kEdgesADiagonal = 400;
 // Of a legend: characters of a name in its title; numbers and colours on each side of zero.
 constexpr size_t kLongestName = 28;
 constexpr int kTicks = 2, kStops = 32;
@@ -163,6 +166,8 @@ Result<std::shared_ptr<const Comparison::Measured>> Comparison::measure(const Su
     measured->diagonal = glm::distance(bounds.low, bounds.high);
     const DeviationTarget target(second.mesh);
     VCP_TRY_ASSIGN(measured->deviation, measureDeviation(measured->mesh, target, {.progress = progress({0.3, 0.4})}));
+    // Colours are of vertices, so the large triangles of a drawing need more of them; figures do not.
+    shortenEdges(measured->mesh, measured->diagonal / kEdgesADiagonal, kMostTriangles);
     VCP_TRY_ASSIGN(measured->distances,
                    distancesOf(measured->mesh.positions, target, {.progress = progress({0.4, 0.6})}));
     measured->compared = {.a = a.name,

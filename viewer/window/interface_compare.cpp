@@ -45,7 +45,7 @@ std::vector<uint32_t> Interface::scansShownFirst() const {
     const std::vector<uint32_t>& hidden = session_->viewer().hidden();
     for (uint32_t i = 0; i < session_->layers().size(); ++i)
         if (session_->layers()[i].triangles > 0) scans.push_back(i);
-    std::ranges::stable_partition(scans, [&](uint32_t i) { return !std::ranges::count(hidden, i); });
+    std::stable_partition(scans.begin(), scans.end(), [&](uint32_t i) { return !std::ranges::count(hidden, i); });
     return scans;
 }
 
