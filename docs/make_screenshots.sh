@@ -20,6 +20,14 @@ awk 'BEGIN { R=192; S=384; pi=atan2(0,-1)
     for (k=0; k<2; k++) for (r=0; r<R; r++) for (s=0; s<S; s++) { t=(s+1)%S; o=k*(R+1)*S; u=k?t:s; v=k?s:t
         print 3, o+r*S+u, o+r*S+v, o+(r+1)*S+u; print 3, o+r*S+v, o+(r+1)*S+v, o+(r+1)*S+u } }' >ball.ply
 "$vcp" build ball.ply -o ball.vcp --progress none >/dev/null
+# The ball as it was drawn: without what the cast has on it.
+awk 'BEGIN { R=96; S=192; pi=atan2(0,-1)
+    print "ply\nformat ascii 1.0\nelement vertex " (R+1)*S "\nproperty float x\nproperty float y\nproperty float z"
+    print "element face " 2*R*S "\nproperty list uchar int vertex_indices\nend_header"
+    for (r=0; r<=R; r++) for (s=0; s<S; s++) { p=pi*r/R; a=2*pi*s/S; q=1+0.08*sin(3*p)*sin(4*a)*sin(p)
+        print q*sin(p)*cos(a), q*cos(p), q*sin(p)*sin(a) }
+    for (r=0; r<R; r++) for (s=0; s<S; s++) { t=(s+1)%S
+        print 3, r*S+s, r*S+t, (r+1)*S+s; print 3, r*S+t, (r+1)*S+t, (r+1)*S+s } }' >plan.ply
 exec 3>display
 Xvfb -noreset -displayfd 3 -screen 0 1600x1000x24 >/dev/null 2>&1 &
 xvfb=$!
@@ -90,6 +98,13 @@ at 400 300
 for _ in 1 2; do xdotool click 4; sleep 0.5; done
 away
 takes section
+closes
+
+opens light 1600x1000 ball ball.vcp --camera iso --unit mm
+key Tab f k
+xdotool type --window "$window" plan
+key Return
+takes compare
 closes
 
 opens dark 800x600 statue statue.vcp --shading steps

@@ -71,6 +71,9 @@ Result<void> ViewSession::showCompared(Comparison::Coloured coloured) {
     Shading shading = viewer_->shading();
     if (shading.mode != ShadingMode::Unlit) shading.mode = ShadingMode::Lit;
     viewer_->setShading(shading);
+    const Comparison::Measured& measured = *compared_->shown.measured;
+    note(fmt::format("95 % of {} lie within {} of {}; the panel (Tab) has the figures", measured.compared.a,
+                     lengthText(measured.deviation.absoluteQuantile(0.95), unit()), measured.compared.b));
     return {};
 }
 
