@@ -97,8 +97,8 @@ void Interface::layOutCompared() {
     drawDistances(deviation, shown.range);
     const double most = std::max(deviation.absoluteQuantile(1), measured.compared.range);
     caption(*look_, "Colours end at");
-    // The slider has its own number while it is dragged: colours are made anew when it is let go.
-    if (!isDraggingRange_) rangeDragged_ = float(std::log10(shown.range / most));
+    // The slider has its own number while it is dragged, and while colours are made anew for it.
+    if (!isDraggingRange_ && !session_->saving()) rangeDragged_ = float(std::log10(shown.range / most));
     ImGui::SetNextItemWidth(-1);
     const std::string text = typeset("± " + lengthText(std::pow(10.0, double(rangeDragged_)) * most, unit));
     ImGui::BeginDisabled(session_->saving().has_value());
