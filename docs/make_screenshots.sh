@@ -101,9 +101,7 @@ takes section
 closes
 
 opens light 1600x1000 ball ball.vcp --camera iso --unit mm
-key Tab f k
-xdotool type --window "$window" plan
-key Return
+key Tab f k p l a n Return
 takes compare
 closes
 

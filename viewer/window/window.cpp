@@ -302,6 +302,7 @@ private:
         }
         if (action == GLFW_RELEASE) return;
         session_->note("");
+        opensPage_ = false;
         if (interface_.takesText()) {
             pageKey(key, mods);
             return layOut();
@@ -315,10 +316,12 @@ private:
             controlKey(key);
         else
             plainKey(key);
+        opensPage_ = interface_.takesText();
     }
 
     void type(uint32_t codepoint) {
-        if (!interface_.takesText()) return;
+        // The key that opened a page is not typed into it.
+        if (!interface_.takesText() || std::exchange(opensPage_, false)) return;
         interface_.type(codepoint);
         layOut();
     }
@@ -450,6 +453,7 @@ private:
     glm::dvec2 pressedAt_{0};
     double pressedTime_ = 0;
     bool isClick_ = false, isDragging_ = false;
+    bool opensPage_ = false;  // the last key did: its character is not typed into the page
     glm::dvec3 held_{0};
     bool mustPresent_ = true, isRescaled_ = false;
     ThemeChoice themeShown_ = ThemeChoice::System;
