@@ -20,14 +20,20 @@ awk 'BEGIN { R=192; S=384; pi=atan2(0,-1)
     for (k=0; k<2; k++) for (r=0; r<R; r++) for (s=0; s<S; s++) { t=(s+1)%S; o=k*(R+1)*S; u=k?t:s; v=k?s:t
         print 3, o+r*S+u, o+r*S+v, o+(r+1)*S+u; print 3, o+r*S+v, o+(r+1)*S+v, o+(r+1)*S+u } }' >ball.ply
 "$vcp" build ball.ply -o ball.vcp --progress none >/dev/null
-# The ball as it was drawn: without what the cast has on it.
-awk 'BEGIN { R=96; S=192; pi=atan2(0,-1)
-    print "ply\nformat ascii 1.0\nelement vertex " (R+1)*S "\nproperty float x\nproperty float y\nproperty float z"
-    print "element face " 2*R*S "\nproperty list uchar int vertex_indices\nend_header"
-    for (r=0; r<=R; r++) for (s=0; s<S; s++) { p=pi*r/R; a=2*pi*s/S; q=1+0.08*sin(3*p)*sin(4*a)*sin(p)
-        print q*sin(p)*cos(a), q*cos(p), q*sin(p)*sin(a) }
-    for (r=0; r<R; r++) for (s=0; s<S; s++) { t=(s+1)%S
-        print 3, r*S+s, r*S+t, (r+1)*S+s; print 3, r*S+t, (r+1)*S+t, (r+1)*S+s } }' >plan.ply
+# A ball as it was drawn, and as it was cast: larger here, smaller there, and with a grain.
+ball() {
+    awk -v E="$1" 'BEGIN { R=192; S=384; pi=atan2(0,-1)
+        print "ply\nformat ascii 1.0\nelement vertex " (R+1)*S "\nproperty float x\nproperty float y"
+        print "property float z\nelement face " 2*R*S "\nproperty list uchar int vertex_indices\nend_header"
+        for (r=0; r<=R; r++) for (s=0; s<S; s++) { p=pi*r/R; a=2*pi*s/S
+            q=1+0.08*sin(3*p)*sin(4*a)*sin(p)+E*(0.006*sin(2*p)*cos(a)+0.001*sin(18*p)*sin(20*a)*sin(p))
+            print q*sin(p)*cos(a), q*cos(p), q*sin(p)*sin(a) }
+        for (r=0; r<R; r++) for (s=0; s<S; s++) { t=(s+1)%S
+            print 3, r*S+s, r*S+t, (r+1)*S+s; print 3, r*S+t, (r+1)*S+t, (r+1)*S+s } }'
+}
+ball 0 >plan.ply
+ball 1 >cast.ply
+"$vcp" build cast.ply -o cast.vcp --progress none >/dev/null
 exec 3>display
 Xvfb -noreset -displayfd 3 -screen 0 1600x1000x24 >/dev/null 2>&1 &
 xvfb=$!
@@ -100,9 +106,10 @@ away
 takes section
 closes
 
-opens light 1600x1000 ball ball.vcp --camera iso --unit mm
+opens light 1600x1000 cast cast.vcp --camera iso --unit mm
 key Tab f k p l a n Return
 takes compare
+key Tab
 closes
 
 opens dark 800x600 statue statue.vcp --shading steps
