@@ -112,6 +112,31 @@ await check('first picture: at most 3 requests and 400 KB', async () => {
     console.log(`   ${ranges.requests} requests, ${ranges.bytes} bytes`);
 });
 
+await check('no byte is asked for twice, though pages lie across what came', async () => {
+    const module = await Module.load(wasm), orbit = new Orbit(), asked = [{ offset: 0, bytes: 64 << 10 }];
+    module.begin(file.length, 'scan.vcp', 64 << 20);
+    module.supply(0, file.subarray(0, 64 << 10));
+    const supplyMissing = () => {
+        for (const { offset, bytes } of module.missing()) {
+            assert.ok(asked.every(one => offset >= one.offset + one.bytes || offset + bytes <= one.offset), `byte ${offset}`);
+            asked.push({ offset, bytes });
+            // It comes in two pieces.
+            module.supply(offset, file.subarray(offset, offset + (bytes >> 1)));
+            module.supply(offset + (bytes >> 1), file.subarray(offset + (bytes >> 1), offset + bytes));
+        }
+    };
+    while (!module.open()) supplyMissing();
+    const info = module.info();
+    orbit.fit(info.boundsMin, info.boundsMax, 1.6);
+    orbit.zoom(0.2, 0, 0);
+    look(module, orbit);
+    for (let update = module.update(); !update.settled; update = module.update()) {
+        if (update.drawable && update.awaitsRays) cast(module);
+        supplyMissing();
+    }
+    assert.ok(asked.some(one => one.offset === 64 << 10), 'a page lies across');
+});
+
 await check('whole and close: settles within the budget, antialiases', async () => {
     for (const budget of [64 << 20, 2 << 20]) {
         const ranges = new Ranges('scan.vcp', server(file)), module = await opened(ranges, budget), info = module.info();
