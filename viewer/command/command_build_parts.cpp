@@ -28,11 +28,20 @@ struct StepCommand {
     ReportOptions report;
 };
 
+/// Returns a word as a shell reads it back.
+std::string shellWord(const std::string& text) {
+    constexpr std::string_view kPlain = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_./-+:,@%";
+    if (!text.empty() && text.find_first_not_of(kPlain) == std::string::npos) return text;
+    std::string word = "'";
+    for (const char c : text) word += c == '\'' ? std::string("'\\''") : std::string(1, c);
+    return word + "'";
+}
+
 std::string summary(const std::string& folder, unsigned parts) {
     std::string text = fmt::format("{}: a build in {} parts; each line once the lines before are done:", folder, parts);
     for (const PartStage& stage : stagesOf(parts))
         text += fmt::format("\n  vcp build-step {} {} --plan {}", stage.name,
-                            stage.parts == 1 ? "0" : fmt::format("{{0..{}}}", stage.parts - 1), folder);
+                            stage.parts == 1 ? "0" : fmt::format("{{0..{}}}", stage.parts - 1), shellWord(folder));
     return text;
 }
 
@@ -71,7 +80,7 @@ Result<int> run(const StepCommand& command) {
     }
     std::string text = fmt::format("{} {}: {}", command.stage, command.number, done.wasDone ? "was done" : "done");
     if (done.dataset)
-        text += fmt::format("; {} triangles in {}", formatCount(done.dataset->triangles),
+        text += fmt::format("; {} in {}", formatCount(done.dataset->triangles, "triangle"),
                             formatBytes(done.dataset->fileBytes));
     for (const std::string& warning : done.warnings) text += fmt::format("\n  {}", warning);
     VCP_TRY(printLine(text));
