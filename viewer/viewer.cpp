@@ -79,7 +79,7 @@ std::string statusLine(const ViewerStatus& status, size_t most) {
     }
     if (status.reduction > 1) parts.push_back(fmt::format("1/{} size", status.reduction));
     parts.push_back(fmt::format("{:.0f} ms", status.frame.msFrame));
-    if (status.levels > 0) parts.push_back(formatCount(status.triangles) + " triangles");
+    if (status.levels > 0) parts.push_back(formatCount(status.triangles, "triangle"));
     if (status.frame.surfaceBytes > 0) parts.push_back("mesostructure " + formatBytes(status.frame.surfaceBytes));
     if (status.update.drawable && status.levels > 0)
         parts.push_back(

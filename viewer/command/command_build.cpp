@@ -35,15 +35,16 @@ struct BuildCommand {
 
 std::string summary(const std::string& output, const BuildReport& report) {
     const double triangles = double(std::max<uint64_t>(report.triangles, 1));
-    std::string text = fmt::format("{}: {} triangles in {} ({:.2f} M/s), peak memory {}\n", output,
-                                   formatCount(report.triangles), formatSeconds(report.seconds),
+    std::string text = fmt::format("{}: {} in {} ({:.2f} M/s), peak memory {}\n", output,
+                                   formatCount(report.triangles, "triangle"), formatSeconds(report.seconds),
                                    1e-6 * triangles / std::max(report.seconds, 1e-9), formatBytes(report.peakRssBytes));
     if (report.degenerateTriangles > 0)
-        text += fmt::format("  {} triangles without area were left out\n", formatCount(report.degenerateTriangles));
+        text += fmt::format("  left out: {} without area\n", formatCount(report.degenerateTriangles, "triangle"));
     for (const std::string& warning : report.warnings) text += fmt::format("  {}\n", warning);
-    text += fmt::format("  {} ({:.1f} bytes a triangle), {} levels, {} subvolumes, {} leaves, {} of them hard\n",
-                        formatBytes(report.fileBytes), double(report.fileBytes) / triangles, report.levels,
-                        formatCount(report.subvolumes), formatCount(report.leaves), formatCount(report.hardLeaves));
+    text += fmt::format("  {} ({:.1f} bytes a triangle), {}, {}, {}, {} of them hard\n", formatBytes(report.fileBytes),
+                        double(report.fileBytes) / triangles, formatCount(report.levels, "level"),
+                        formatCount(report.subvolumes, "subvolume"), formatCount(report.leaves, "leaf", "leaves"),
+                        formatCount(report.hardLeaves));
     text += fmt::format("  cell {}, ", formatLength(report.cell));
     if (std::isnan(report.certifiedErrorMax)) return text + "no certified error";
     return text + fmt::format("certified error {} ({:.3f} cells)", formatLength(report.certifiedErrorMax),
@@ -73,15 +74,15 @@ Json toJson(const BuildEstimate& estimate) {
 
 std::string summary(const BuildEstimate& estimate) {
     const SoupMeasures& m = estimate.measures;
-    std::string text = fmt::format("{} triangles ({} without area), {} vertices, {}\n", formatCount(m.triangles),
-                                   formatCount(m.degenerateTriangles), formatCount(m.vertices),
+    std::string text = fmt::format("{} ({} without area), {}, {}\n", formatCount(m.triangles, "triangle"),
+                                   formatCount(m.degenerateTriangles), formatCount(m.vertices, "vertex", "vertices"),
                                    m.hasVertexColours ? "with colours"
                                    : m.hasMaterials   ? "with materials"
                                                       : "no colour");
     text += fmt::format("  bounds      {:.9g} {:.9g} {:.9g}  to  {:.9g} {:.9g} {:.9g}\n", m.boundsMin.x, m.boundsMin.y,
                         m.boundsMin.z, m.boundsMax.x, m.boundsMax.y, m.boundsMax.z);
-    text += fmt::format("  cell        {}{}, {} levels\n", estimate.isAreaComplete ? "" : "about ",
-                        formatLength(estimate.frame.cell), estimate.frame.levels);
+    text += fmt::format("  cell        {}{}, {}\n", estimate.isAreaComplete ? "" : "about ",
+                        formatLength(estimate.frame.cell), formatCount(estimate.frame.levels, "level"));
     if (estimate.warning) text += fmt::format("  {}\n", *estimate.warning);
     text += fmt::format("  memory      about {}, at most {}\n", formatBytes(estimate.memoryBytes),
                         formatBytes(estimate.memoryCap));

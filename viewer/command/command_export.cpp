@@ -116,11 +116,11 @@ Result<int> reportMesh(const Job& job, const SurfaceCut& cut, const MeshExportFi
         return 0;
     }
     const std::string vertices =
-        figures.totals.vertices > 0 ? fmt::format(", {} vertices", formatCount(figures.totals.vertices)) : "";
-    VCP_TRY(printLine(
-        fmt::format("{}: {} triangles{}, level {} of 0 to {}, {} in {}\n  within {} of the mesh, both ways",
-                    job.command.output, formatCount(figures.totals.triangles), vertices, cut.level(), job.levels() - 1,
-                    formatBytes(figures.fileBytes), formatSeconds(job.seconds()), formatLength(figures.certified))));
+        figures.totals.vertices > 0 ? ", " + formatCount(figures.totals.vertices, "vertex", "vertices") : "";
+    VCP_TRY(printLine(fmt::format("{}: {}{}, level {} of 0 to {}, {} in {}\n  within {} of the mesh, both ways",
+                                  job.command.output, formatCount(figures.totals.triangles, "triangle"), vertices,
+                                  cut.level(), job.levels() - 1, formatBytes(figures.fileBytes),
+                                  formatSeconds(job.seconds()), formatLength(figures.certified))));
     return 0;
 }
 
@@ -170,12 +170,12 @@ Result<int> runSection(const Job& job) {
         VCP_TRY(printJson(json));
         return 0;
     }
-    VCP_TRY(printLine(fmt::format(
-        "{}: {} lines, {} of them closed, {} points, {}{} long, level {} of 0 to {}, {}\n  of a surface within {} of "
-        "the mesh",
-        job.command.output, formatCount(figures->lines), formatCount(figures->closedLines),
-        formatCount(figures->points), formatLength(figures->length), unit, cut.level(), job.levels() - 1,
-        formatBytes(figures->fileBytes), formatLength(figures->certified))));
+    VCP_TRY(printLine(
+        fmt::format("{}: {}, {} of them closed, {}, {}{} long, level {} of 0 to {}, {}\n  of a surface within {} of "
+                    "the mesh",
+                    job.command.output, formatCount(figures->lines, "line"), formatCount(figures->closedLines),
+                    formatCount(figures->points, "point"), formatLength(figures->length), unit, cut.level(),
+                    job.levels() - 1, formatBytes(figures->fileBytes), formatLength(figures->certified))));
     return 0;
 }
 

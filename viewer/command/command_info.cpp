@@ -107,8 +107,8 @@ std::string paperLine(const PaperParameters& p) {
 
 std::string partsLine(const FileHeader& h) {
     const char* kind = h.closedParts == h.parts ? "closed" : h.closedParts == 0 ? "open" : "mixed";
-    return fmt::format("  parts       {}: {} closed, {} open with {} open edges\n", kind, formatCount(h.closedParts),
-                       formatCount(h.parts - h.closedParts), formatCount(h.openEdges));
+    return fmt::format("  parts       {}: {} closed, {} open with {}\n", kind, formatCount(h.closedParts),
+                       formatCount(h.parts - h.closedParts), formatCount(h.openEdges, "open edge"));
 }
 
 std::string bytesLine(const Dataset& dataset) {
@@ -120,8 +120,8 @@ std::string bytesLine(const Dataset& dataset) {
 std::string summary(const std::string& file, const Dataset& dataset) {
     const FileHeader& h = dataset.header;
     std::string text = fmt::format("{}: .vcp version {}, {}\n", file, h.version, formatBytes(h.fileBytes));
-    text += fmt::format("  mesh        {} triangles ({} without area), {} vertices, {}\n", formatCount(h.triangles),
-                        formatCount(h.degenerateTriangles), formatCount(h.vertices),
+    text += fmt::format("  mesh        {} ({} without area), {}, {}\n", formatCount(h.triangles, "triangle"),
+                        formatCount(h.degenerateTriangles), formatCount(h.vertices, "vertex", "vertices"),
                         dataset.hasColour() ? "with colour" : "no colour");
     text += bytesLine(dataset);
     if (dataset.hasParts()) text += partsLine(h);

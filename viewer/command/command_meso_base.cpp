@@ -44,12 +44,10 @@ Result<BaseSurface> readScan(const MakeBase& command, ProgressDisplay& display) 
 }
 
 std::string summary(const MakeBase& command, const SurfaceEdges& before, const SurfaceEdges& after, bool isMapped) {
-    const std::string closed =
-        after.border == 0 ? "closed" : fmt::format("{} edges on its border", formatCount(after.border));
-    std::string text = fmt::format("{}: {} of {} triangles, {}, {} {}", command.out, formatCount(after.triangles),
-                                   formatCount(before.triangles), closed, formatCount(after.parts),
-                                   after.parts == 1 ? "part" : "parts");
-    text += isMapped ? fmt::format(", {} edges on seams", formatCount(after.seams))
+    const std::string closed = after.border == 0 ? "closed" : formatCount(after.border, "edge") + " on its border";
+    std::string text = fmt::format("{}: {} of {}, {}, {}", command.out, formatCount(after.triangles),
+                                   formatCount(before.triangles, "triangle"), closed, formatCount(after.parts, "part"));
+    text += isMapped ? ", " + formatCount(after.seams, "edge") + " on seams"
                      : std::string("\n  without texture coordinates: unwrap it before mesostructure is laid on it");
     if (after.triangles > command.triangles)
         text += "\n  no more edges can go without turning a face or changing how the surface hangs together";

@@ -152,7 +152,7 @@ Result<int> run(const VerifyCommand& command) {
     if (!dataset) return broken(command, dataset.error());
 
     Json json = {{"ok", true}, {"pages", dataset->header.pages}, {"bytes", dataset->header.fileBytes}};
-    std::string text = fmt::format("{}: intact, {} subvolumes, {}", ahead.name(), formatCount(dataset->header.pages),
+    std::string text = fmt::format("{}: intact, {}, {}", ahead.name(), formatCount(dataset->header.pages, "subvolume"),
                                    formatBytes(dataset->header.fileBytes));
     bool within = true;
     std::optional<SurfaceDistance> distance;

@@ -147,6 +147,12 @@ std::string formatCount(uint64_t count) {
     return formatCount(count / 1000) + fmt::format(" {:03}", count % 1000);
 }
 
+std::string formatCount(uint64_t count, std::string_view one, std::string_view many) {
+    const std::string_view plural = many.empty() ? one : many;
+    return fmt::format("{} {}{}", formatCount(count), count == 1 ? one : plural,
+                       count == 1 || !many.empty() ? "" : "s");
+}
+
 std::string formatBytes(uint64_t bytes) {
     constexpr const char* kUnits[] = {"B", "kB", "MB", "GB", "TB", "PB", "EB"};
     double value = double(bytes);

@@ -66,6 +66,9 @@ std::optional<glm::dvec3> parseDirection(std::string_view text);
 /// Returns a text such as "1 087 716".
 std::string formatCount(uint64_t count);
 
+/// Returns a text such as "1 line" or "12 lines"; `many` where an s does not make it.
+std::string formatCount(uint64_t count, std::string_view one, std::string_view many = {});
+
 /// Returns a text such as "13.2 MB", in powers of 1000 as file managers show it.
 std::string formatBytes(uint64_t bytes);
 

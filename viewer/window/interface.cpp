@@ -266,7 +266,7 @@ void Interface::layOutStatus() {
         if (status.reduction > 1)
             parts.emplace_back(fmt::format("1/{} size while moving", status.reduction), palette.dim);
         if (!status.without.empty()) parts.emplace_back(status.without, palette.dim);
-        if (status.levels > 0) parts.emplace_back(formatCount(status.triangles) + " triangles", palette.dim);
+        if (status.levels > 0) parts.emplace_back(formatCount(status.triangles, "triangle"), palette.dim);
         parts.emplace_back(status.name, palette.dim);
     } else {
         parts.emplace_back(session_->opening() ? "Opening" : "Nothing is open", palette.dim);

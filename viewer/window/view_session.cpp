@@ -482,7 +482,7 @@ void ViewSession::takeCut() {
     const std::string name = cut_->output().string();
     cut_.reset();
     if (!figures) return say(figures.error().line());
-    note(fmt::format("written: {} in {}: {} lines, {} long", name, workingFolder(), figures->lines,
+    note(fmt::format("written: {} in {}: {}, {} long", name, workingFolder(), formatCount(figures->lines, "line"),
                      lengthText(figures->length, unit())));
 }
 

@@ -79,6 +79,10 @@ TEST(OptionValues, NumbersForPeople) {
     EXPECT_EQ(formatCount(0), "0");
     EXPECT_EQ(formatCount(999), "999");
     EXPECT_EQ(formatCount(1087716), "1 087 716");
+    EXPECT_EQ(formatCount(0, "line"), "0 lines");
+    EXPECT_EQ(formatCount(1, "line"), "1 line");
+    EXPECT_EQ(formatCount(1, "leaf", "leaves"), "1 leaf");
+    EXPECT_EQ(formatCount(1200, "leaf", "leaves"), "1 200 leaves");
     EXPECT_EQ(formatBytes(0), "0 B");
     EXPECT_EQ(formatBytes(999), "999 B");
     EXPECT_EQ(formatBytes(13'200'000), "13.2 MB");
