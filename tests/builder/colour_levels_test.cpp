@@ -236,7 +236,7 @@ TEST_F(ColourLevels, SurfacesOfAnyColourKeepTheirLight) {
         Painted ball{test::sphereMesh({0, 0, 0}, 10, rings), {}};
         for (size_t v = 0; v < ball.mesh.positions.size(); ++v) ball.colours.push_back(uint32_t(random()));
         build(ball, 0.12);
-        EXPECT_GE(levelsOf(compare(Shown(folder_ / "out.vcp", 5))), 3u);
+        EXPECT_GE(levelsOf(compare(Shown(folder_ / "out.vcp", 3))), 3u);
     }
 }
 
