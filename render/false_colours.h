@@ -10,6 +10,9 @@ namespace vcp {
 /// Whether the mode shows numbers, as colours from blue through green to red.
 bool isFalseColour(ShadingMode mode);
 
+/// Whether the mode shows a number of each hit: as a false colour, or as a line.
+bool showsNumbers(ShadingMode mode);
+
 /// Returns the colour that stands for a part of the number at the colours' end, as pictures have it, 0 to 1: 0 is blue,
 /// 1 and more are red.
 glm::vec3 falseColour(double part);

@@ -26,6 +26,8 @@ enum class ShadingMode {
     Fetches,  ///< 16-byte reads of the ray, 0 to 128 (the same)
     Level,    ///< level of the page that was hit, coarsest to finest
     Error,    ///< certified error of the page that was hit, 0 to 1 pixel
+
+    Wireframe,  ///< clay, with light, and the edges of triangles and leaves (render/shared/wireframe.h)
 };
 
 /// Cuts away what lies on the plane's far side: what has dot(normal, x) >= offset (world units) is kept.

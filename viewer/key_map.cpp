@@ -25,6 +25,7 @@ constexpr KeyHelp kKeyMap[] = {
     {KeyGroup::View, "Shift+1 ... Shift+9", "go to a bookmark"},
     {KeyGroup::View, "Ctrl+C, Ctrl+V", "copy the camera as JSON, go to the copied one"},
     {KeyGroup::Look, "M", "shading mode"},
+    {KeyGroup::Look, "W", "wireframe: edges of triangles and leaves, or as before"},
     {KeyGroup::Look, "C", "colours of the scan, or clay"},
     {KeyGroup::Look, "L", "the light follows the camera, or stays"},
     {KeyGroup::Look, "S", "shadows"},

@@ -38,7 +38,7 @@ constexpr double kFlySpeedPerNotch = 1.25;
 constexpr double kSmallestInView = 1e-3;
 
 ShadingMode next(ShadingMode mode) {
-    return mode == ShadingMode::Error ? ShadingMode::Lit : static_cast<ShadingMode>(int(mode) + 1);
+    return mode == ShadingMode::Wireframe ? ShadingMode::Lit : static_cast<ShadingMode>(int(mode) + 1);
 }
 
 /// Shortens a long name in its middle.

@@ -51,7 +51,7 @@ enum class ViewerAction {
     ToggleShadows,
     ToggleOcclusion,   ///< ambient occlusion; left out while the camera moves
     ToggleSection,     ///< cuts through the middle, away from the viewer, with caps; or removes all section planes
-    NextShading,       ///< lit, unlit, clay, normals, steps, cells, fetches, level, error
+    NextShading,       ///< lit, unlit, clay, normals, steps, cells, fetches, level, error, wireframe
     ToggleProjection,  ///< perspective or orthographic, same size at the point of interest
     ToggleColour,      ///< the dataset's colours, or clay
     ToggleUpAxis,      ///< y or z

@@ -68,7 +68,7 @@ private:
         TileSurface surface;
         findNormals(layer_.rays, hits, surface);
         alignas(32) uint32_t colours[kTilePixels];
-        if (frame_.shadingMode >= frame::kShadeSteps) {
+        if (frame_.shadingMode >= frame::kShadeSteps && frame_.shadingMode <= frame::kShadeError) {
             forEachHit(hits, [&](glm::ivec2, int i) { colours[i] = falseColour(hits, i); });
             return put(hits, surface, colours);
         }
@@ -81,6 +81,10 @@ private:
         }
         tiles_.findAlbedo(hits, surface);
         shadeTile(frame_, surface, colours);
+        if (frame_.shadingMode == frame::kShadeWireframe)
+            forEachHit(hits, [&](glm::ivec2 pixel, int i) {
+                if (!hits.onCap[size_t(i)]) colours[i] = withLine(colours[i], tiles_.lineOf(hits, pixel, i));
+            });
         put(hits, surface, colours);
     }
 

@@ -103,6 +103,10 @@ void LayerTiles::setClay(TileSurface& surface) const {
     std::fill_n(surface.blue, kTilePixels, layer_.frame.clay.z);
 }
 
+HitLine LayerTiles::lineOf(const TileHits& hits, glm::ivec2 pixel, int i) const {
+    return lineAt(layer_.scene, hits, i, glm::vec3(rayOf(pixel).direction), pixelEdgeAt(depthInCells(hits.depth[i])));
+}
+
 HostHit LayerTiles::hitOf(const TileHits& hits, int i) const {
     return {layer_.number, hits.leaves[hits.leaf[i]].page & INT32_MAX, hits.onCap[size_t(i)]};
 }

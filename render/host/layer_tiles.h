@@ -12,6 +12,7 @@
 #include "render/host/section_cut.h"
 #include "render/host/tile_hits.h"
 #include "render/host/tile_shading.h"
+#include "render/host/wireframe.h"
 
 namespace vcp {
 
@@ -40,6 +41,8 @@ public:
     /// Finds the colours of a tile's hits without light.
     void findAlbedo(const TileHits& hits, TileSurface& surface) const;
     void setClay(TileSurface& surface) const;
+    /// Returns the line of the wireframe at a hit.
+    [[nodiscard]] HitLine lineOf(const TileHits& hits, glm::ivec2 pixel, int i) const;
 
     /// Whether hits are shown in their own colours.
     [[nodiscard]] bool isColoured() const { return isColoured_; }

@@ -6,15 +6,7 @@
 #include <glm/geometric.hpp>
 #include <glm/packing.hpp>
 
-#include "octree/surface/leaf_math.h"
-
 namespace vcp {
-
-namespace f32 {
-#define INLINE inline
-#include "render/shared/wireframe.h"
-#undef INLINE
-}  // namespace f32
 
 namespace {
 

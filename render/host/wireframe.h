@@ -3,10 +3,17 @@
 
 #include <glm/vec3.hpp>
 
+#include "octree/surface/leaf_math.h"
 #include "render/host/host_scene.h"
 #include "render/host/tile_hits.h"
 
 namespace vcp {
+
+namespace f32 {
+#define INLINE inline
+#include "render/shared/wireframe.h"
+#undef INLINE
+}  // namespace f32
 
 /// How much of a line is seen at a hit, 0 to 1, and of what it is.
 struct HitLine {

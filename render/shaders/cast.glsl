@@ -261,9 +261,11 @@ float castPage(Ray ray, Page page, float s, float until, inout Hit hit, inout Wo
     }
     hit.leaf = descent.node;
     int cellBits = page.bits - int(frame.log2Cells);
+    int leafBits = cellBits - int(kMaxSubcellDepth) + descent.bits - 1;
     bool slab = nodeType(descent.node) == kNodeSlab;
-    if (slab) hit.at.w = float(cellBits - int(kMaxSubcellDepth) + descent.bits - 1);
+    if (slab) hit.at.w = float(leafBits);
     if (slab) hit.corners = uvec3(page.corner + ivec3(lo * powerOfTwo(cellBits)));
+    if (kFalseColour != 0u && nodeType(descent.node) == kNodeSoft) hit.corners.x = uint(leafBits);
     return found >= 0.0 ? sStart + found * page.cell : kNoHit;
 }
 

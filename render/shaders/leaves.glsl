@@ -13,7 +13,9 @@ struct Hit {
     // Soft: the point in leaf space, and the side the ray came from (sideBefore). Hard: weights of the second and third
     // vertex. Slab: the point in leaf space, and log2 of the leaf's edge on the lattice.
     vec4 at;
-    uvec3 corners;  // hard: the triangle's vertices; slab: the leaf's lowest corner on the lattice
+    // Hard: the triangle's vertices. Slab: the leaf's lowest corner on the lattice. Soft, where numbers of hits are
+    // shown: log2 of the leaf's edge on the lattice, first.
+    uvec3 corners;
 };
 
 // What is seen of a hit.

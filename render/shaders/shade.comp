@@ -7,6 +7,7 @@
 #include "render/shaders/tiles.glsl"
 #include "render/shaders/hit_records.glsl"
 #include "render/shared/hit_light.h"
+#include "render/shared/wireframe.h"
 #include "render/shaders/scene_light.glsl"
 
 // 0: none; 1: the hits have a plane of light; 2: the picture of several datasets has.
@@ -66,7 +67,8 @@ void main() {
     float depth = hit.depth;
     bool ofWork = kFalseColour != 0u && (frame.shadingMode >= kShadeSteps && frame.shadingMode <= kShadeFetches);
     if (depth >= kNoHit && !ofWork) return;
-    if (kFalseColour != 0u) {
+    bool wired = kFalseColour != 0u && frame.shadingMode == kShadeWireframe;
+    if (kFalseColour != 0u && !wired) {
         float value = uintBitsToFloat(fetchHit(frame.lightPlane * plane + at));
         picturePixels[at] = packUnorm4x8(vec4(heat(value), 1.0));
         return;
@@ -91,6 +93,10 @@ void main() {
                   : frame.shadingMode == kShadeUnlit
                       ? albedo
                       : albedo * encodedLight(n, frame.upDirection.xyz, sunlightOfAll(n, seen), skySeen);
+    if (wired) {
+        float line = uintBitsToFloat(fetchHit(frame.lightPlane * plane + at));
+        colour = mix(colour, line < 0.0 ? leafInk() : triangleInk(), abs(line));
+    }
     if (kLight == 2u)
         targetPixels[at] = packUnorm4x8(vec4(colour, 1.0));
     else

@@ -11,6 +11,7 @@ const uint kHitBy = kHitByCamera;
 #include "render/shaders/cast.glsl"
 #include "render/shaders/sections.glsl"
 #include "render/shaders/hit_records.glsl"
+#include "render/shaders/wireframe.glsl"
 #include "render/shared/hit_light.h"
 
 layout(constant_id = 6) const uint kSections =
@@ -176,14 +177,22 @@ void main() {
     if (frame.opacity < 1.0 && isFaded(frame.opacity, pixel.x, pixel.y, frame.sampleNumber)) hit.depth = kNoHit;
     bool found = hit.depth < kNoHit;
     // A blended normal may lean away from the ray near a silhouette: it is bent back to it.
-    vec3 normal = surface.normal * inversesqrt(max(dot(surface.normal, surface.normal), 1e-30));
-    normal -= max(dot(normal, ray.direction), 0.0) * ray.direction;
+    vec3 unit = surface.normal * inversesqrt(max(dot(surface.normal, surface.normal), 1e-30));
+    vec3 normal = unit - max(dot(unit, ray.direction), 0.0) * ray.direction;
     uint at = pixel.y * frame.width + pixel.x;
     uint plane = frame.width * frame.height;
     hits[at] = floatBitsToUint(onCap ? -hit.depth : hit.depth);
     hits[plane + at] = packHitNormal(normal);
     if (kColour != 0u) hits[2u * plane + at] = packUnorm4x8(surface.colour);
-    if (kFalseColour != 0u) hits[frame.lightPlane * plane + at] = floatBitsToUint(falseColour(hit, work));
+    if (kFalseColour != 0u) {
+        float shown = falseColour(hit, work);
+        bool wired = frame.shadingMode == kShadeWireframe;
+        while (wired) {
+            shown = onCap ? 0.0 : lineOf(hit, unit, ray.direction);
+            wired = false;
+        }
+        hits[frame.lightPlane * plane + at] = floatBitsToUint(shown);
+    }
 
     uint hitCount = subgroupBallotBitCount(subgroupBallot(found));
     if (subgroupElect()) atomicAdd(counters.hitPixels, hitCount);

@@ -25,6 +25,8 @@ const uint kShadeCells = 5u;
 const uint kShadeFetches = 6u;
 const uint kShadeLevel = 7u;
 const uint kShadeError = 8u;
+// The false colours end here.
+const uint kShadeWireframe = 9u;
 // The counts of work that false colours show as 1.
 const float kMostShownSteps = 64.0f;
 const float kMostShownCells = 16.0f;

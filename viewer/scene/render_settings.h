@@ -59,9 +59,9 @@ struct RenderSettings {
 };
 
 /// The names of shading modes, in the order of ShadingMode.
-inline constexpr std::array<const char*, 9> kShadingNames = {"lit",   "clay",    "unlit", "normals", "steps",
-                                                             "cells", "fetches", "level", "error"};
-static_assert(kShadingNames.size() == size_t(ShadingMode::Error) + 1);
+inline constexpr std::array<const char*, 10> kShadingNames = {"lit",   "clay",    "unlit", "normals", "steps",
+                                                              "cells", "fetches", "level", "error",   "wireframe"};
+static_assert(kShadingNames.size() == size_t(ShadingMode::Wireframe) + 1);
 /// Returns the mode of such a name.
 std::optional<ShadingMode> shadingNamed(std::string_view name);
 

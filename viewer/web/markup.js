@@ -66,7 +66,7 @@ export const kMarkup = `
     <button data-do="fit" title="Show all (F)">Fit</button>
     <select aria-label="Shading"><option value="lit">Lit</option><option value="clay">Clay</option>
         <option value="unlit">Colours</option><option value="normals">Normals</option><option value="level">Levels</option>
-        <option value="error">Error</option></select>
+        <option value="error">Error</option><option value="wireframe">Wireframe</option></select>
     <button data-do="measure" aria-pressed="false" title="Measure a distance (M)">Measure</button>
     <button data-do="more" aria-pressed="false" aria-expanded="false" title="Light, shadows, section">Light</button>
     <button data-do="link" title="Copy a link to this view">Link</button>

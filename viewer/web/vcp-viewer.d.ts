@@ -25,7 +25,7 @@ export interface Annotation {
     text?: string;
 }
 
-export type ShadingMode = 'lit' | 'clay' | 'unlit' | 'normals' | 'level' | 'error';
+export type ShadingMode = 'lit' | 'clay' | 'unlit' | 'normals' | 'level' | 'error' | 'wireframe';
 
 /**
  * `<vcp-viewer src annotations mode theme budget workers light shadows occlusion section up>`;

@@ -2,7 +2,7 @@
 import { Light, Orbit, kFieldOfView, difference, length, sectionOf } from './camera.js';
 import { kMarkup, kStyle } from './markup.js';
 
-const kModes = { lit: 0, clay: 1, unlit: 2, normals: 3, level: 7, error: 8 };
+const kModes = { lit: 0, clay: 1, unlit: 2, normals: 3, level: 7, error: 8, wireframe: 9 };
 const kMovingScale = 0.4; // of the resolution, while the view moves
 const kOcclusionRays = 8; // a pixel
 const kRestMs = 160; // without a movement: the view is at rest

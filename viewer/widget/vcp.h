@@ -311,7 +311,8 @@ enum {
     VCP_SHADING_CELLS = 5,
     VCP_SHADING_FETCHES = 6,
     VCP_SHADING_LEVEL = 7, /* false colours: level and certified error of what was hit */
-    VCP_SHADING_ERROR = 8
+    VCP_SHADING_ERROR = 8,
+    VCP_SHADING_WIREFRAME = 9 /* clay with the edges of triangles and leaves */
 };
 
 /* How things look. With all zero it is the usual look: lit, by a light that follows the camera, before a grey that

@@ -276,7 +276,8 @@ void fillIn(vcp_look& look, bool hasWindow) {
 }
 
 Result<void> checkLook(const vcp_look& look) {
-    if (look.shading < VCP_SHADING_LIT || look.shading > VCP_SHADING_ERROR) return wrong("there is no such shading");
+    if (look.shading < VCP_SHADING_LIT || look.shading > VCP_SHADING_WIREFRAME)
+        return wrong("there is no such shading");
     if (!(look.error_pixels > 0) || !std::isfinite(look.error_pixels)) return wrong("error_pixels is not above 0");
     if (look.occlusion_rays > kMostOcclusionRays) return wrong("more than 64 occlusion rays");
     if (!(look.occlusion_radius >= 0) || !std::isfinite(look.occlusion_radius))
@@ -398,7 +399,7 @@ static_assert(VCP_VIEW_ISOMETRIC == int(ViewerAction::ViewIsometric) &&
               VCP_TOGGLE_FLY == int(ViewerAction::ToggleFly) &&
               VCP_TOGGLE_SECTION == int(ViewerAction::ToggleSection) &&
               VCP_NEXT_SHADING == int(ViewerAction::NextShading));
-static_assert(VCP_SHADING_ERROR == int(ShadingMode::Error) && VCP_SHADING_STEPS == int(ShadingMode::Steps));
+static_assert(VCP_SHADING_WIREFRAME == int(ShadingMode::Wireframe) && VCP_SHADING_STEPS == int(ShadingMode::Steps));
 static_assert(VCP_RIGHT == int(MouseButton::Right) && VCP_MIDDLE == int(MouseButton::Middle));
 
 }  // namespace vcp::widget

@@ -165,7 +165,8 @@ void Interface::layOutLight() {
                                              "Work: cells",
                                              "Work: reads of memory",
                                              "Level of detail",
-                                             "Error"};
+                                             "Error",
+                                             "Wireframe"};
     static_assert(std::size(kNames) == kShadingNames.size());
     if (comboRow(*look_, "##shading", kNames, mode, {"What colours show", "M"}))
         shading.mode = static_cast<ShadingMode>(mode);

@@ -217,6 +217,14 @@ void ViewSession::act(ViewerAction action) {
     if (const std::string why = viewer_->whyWithout(action); !why.empty()) note(why);
 }
 
+void ViewSession::toggleWireframe() {
+    Shading shading = viewer_->shading();
+    const bool isWired = shading.mode == ShadingMode::Wireframe;
+    if (!isWired) unwired_ = shading.mode;
+    shading.mode = isWired ? unwired_ : ShadingMode::Wireframe;
+    viewer_->setShading(shading);
+}
+
 void ViewSession::note(std::string text) {
     note_ = std::move(text);
     notedAt_ = std::numeric_limits<double>::quiet_NaN();

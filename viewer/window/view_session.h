@@ -95,6 +95,9 @@ public:
     [[nodiscard]] const std::string& note() const { return note_; }
     void note(std::string text);
 
+    /// Shows the edges of triangles and leaves, or again what was shown before.
+    void toggleWireframe();
+
     /// What is shown, part by part.
     struct Layer {
         std::string name;
@@ -233,6 +236,7 @@ private:
     MeshPreview preview_;
     std::optional<Camera> framed_;  // how the preview was framed last; a person may have moved the camera since
     std::string shown_;             // rememberedName of what is shown; empty: nothing
+    ShadingMode unwired_ = ShadingMode::Lit;  // the mode before the wireframe
     bool wasShown_ = false, showsFeedback_ = false, hasSceneLight_ = false;
     std::string problem_, note_;
     double notedAt_;  // time of the update that saw the note first; not a number until then

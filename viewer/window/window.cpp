@@ -366,6 +366,9 @@ private:
             case GLFW_KEY_K:
                 interface_.toggleComparison();
                 break;
+            case GLFW_KEY_W:
+                session_->toggleWireframe();
+                break;
             case GLFW_KEY_ENTER:
                 session_->measurement().finishLine();
                 break;

@@ -140,6 +140,41 @@ TEST_F(HostRendererTest, ABuiltMeshInEveryModeAndSeveralLevels) {
     }
 }
 
+// Lines come from the place of a hit in its leaf, so a hit on another leaf may have another line.
+TEST_F(HostRendererTest, WireframesOfEveryKindOfLeaf) {
+    const test::BuiltMesh built = torusAndBox();
+    ASSERT_TRUE(built.ok());
+    open(built);
+    for (const double errorPixels : {0.2, 4.0, 30.0}) {
+        Difference all;
+        uint64_t inked = 0;
+        for (const NamedCamera& named : test::cameras(kLow, kHigh)) {
+            SCOPED_TRACE(named.name);
+            FrameRequest request = requestOf(named.camera);
+            request.errorPixels = errorPixels;
+            request.shading.mode = ShadingMode::Clay;
+            const Planes clay = drawnBy(*host_, request);
+            request.shading.mode = ShadingMode::Wireframe;
+            all += difference(request, built.cache().dataset().header.cell);
+            const Planes wired = drawnBy(*host_, request);
+            for (size_t i = 0; i < clay.depth.size(); ++i)
+                inked += channelsApart(clay.picture, wired.picture, i) > 16 ? 1 : 0;
+        }
+        expectFew(all);
+        EXPECT_GT(inked, 1000u);
+    }
+    Difference leaves;
+    for (const Scene& scene : test::scenesOfEveryLeaf()) {
+        open(scene);
+        for (const NamedCamera& named : test::cameras(scene)) {
+            FrameRequest request = requestOf(named.camera);
+            request.shading.mode = ShadingMode::Wireframe;
+            leaves += difference(request, scene.dataset->header.cell);
+        }
+    }
+    expectFew(leaves);
+}
+
 TEST_F(HostRendererTest, ShadowsAndOcclusion) {
     const test::BuiltMesh built = torusAndBox();
     ASSERT_TRUE(built.ok());
