@@ -8,7 +8,7 @@ namespace vcp {
 
 bool isFalseColour(ShadingMode mode) { return mode >= ShadingMode::Steps && mode <= ShadingMode::Error; }
 
-bool showsNumbers(ShadingMode mode) { return isFalseColour(mode) || mode == ShadingMode::Wireframe; }
+bool hasHitNumbers(ShadingMode mode) { return isFalseColour(mode) || mode == ShadingMode::Wireframe; }
 
 glm::vec3 falseColour(double part) { return f32::heat(float(part)); }
 

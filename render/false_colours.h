@@ -11,7 +11,7 @@ namespace vcp {
 bool isFalseColour(ShadingMode mode);
 
 /// Whether the mode shows a number of each hit: as a false colour, or as a line.
-bool showsNumbers(ShadingMode mode);
+bool hasHitNumbers(ShadingMode mode);
 
 /// Returns the colour that stands for a part of the number at the colours' end, as pictures have it, 0 to 1: 0 is blue,
 /// 1 and more are red.

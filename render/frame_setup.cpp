@@ -142,7 +142,7 @@ bool hasLight(const Shading& shading) {
 }
 
 uint32_t hitPlanes(const FrameRequest& request, bool colour) {
-    return 2 + (colour ? 1 : 0) + (hasLight(request.shading) || showsNumbers(request.shading.mode) ? 1 : 0);
+    return 2 + (colour ? 1 : 0) + (hasLight(request.shading) || hasHitNumbers(request.shading.mode) ? 1 : 0);
 }
 
 frame::FrameConstants frameConstants(const FrameRequest& request, const Dataset* dataset, uint32_t stripes, bool colour,

@@ -31,7 +31,7 @@ PassConstants Renderer::View::constantsFor(const Layer& layer, const FrameReques
         c.chunkShift = poolOf(*residency).chunkShift();
         c.colour = residency->hasColour();
     }
-    c.falseColour = showsNumbers(request.shading.mode);
+    c.falseColour = hasHitNumbers(request.shading.mode);
     c.countSteps = request.countSteps || showsWork(request.shading.mode);
     return c;
 }
