@@ -55,7 +55,8 @@ vcp_camera changed(vcp_camera camera, const py::kwargs& fields) {
     return camera;
 }
 
-constexpr const char* kShadings[] = {"lit", "clay", "unlit", "normals", "steps", "cells", "fetches", "level", "error", "wireframe"};
+constexpr const char* kShadings[] = {"lit",   "clay",    "unlit", "normals", "steps",
+                                     "cells", "fetches", "level", "error",   "wireframe"};
 static_assert(std::size(kShadings) == VCP_SHADING_WIREFRAME + 1);
 
 Triple triple(const float* values) { return {values[0], values[1], values[2]}; }
