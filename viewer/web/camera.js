@@ -126,3 +126,13 @@ export function sectionOf(text, boundsMin, boundsMax) {
     const place = boundsMin[axis] + Number(match[3]) * (boundsMax[axis] - boundsMin[axis]);
     return { normal: [0, 1, 2].map(i => (i === axis ? sign : 0)), offset: sign * place };
 }
+
+const kMovingMs = 50, kLeastScale = 0.1;
+
+/// Returns the part of the resolution, along each side, of the next picture of a view that moves, where the one before had
+/// `scale` and took `ms`. What is near enough stays, so that resolutions do not change all the time.
+export function movingScale(scale, ms) {
+    if (ms > 0.6 * kMovingMs && ms <= kMovingMs) return scale;
+    const by = Math.sqrt(0.8 * kMovingMs / Math.max(ms, 1));
+    return Math.min(Math.max(scale * Math.min(Math.max(by, 0.5), 1.5), kLeastScale), 1);
+}

@@ -1,9 +1,9 @@
 // <vcp-viewer src="scan.vcp">: a scan in a page, streamed and drawn by a worker.
-import { Light, Orbit, kFieldOfView, difference, length, sectionOf } from './camera.js';
+import { Light, Orbit, kFieldOfView, difference, length, movingScale, sectionOf } from './camera.js';
 import { kMarkup, kStyle } from './markup.js';
 
 const kModes = { lit: 0, clay: 1, unlit: 2, normals: 3, level: 7, error: 8, wireframe: 9 };
-const kMovingScale = 0.4; // of the resolution, while the view moves
+const kMovingScale = 0.4; // of the resolution, while the view moves for the first time
 const kOcclusionRays = 8; // a pixel
 const kRestMs = 160; // without a movement: the view is at rest
 const kSaidMs = 4000; // a line that answers a button stands as long
@@ -54,6 +54,7 @@ export class VcpViewer extends HTMLElement {
         };
         this.orbit = new Orbit();
         this.light = new Light();
+        this.movingScale = kMovingScale;
         this.info = null;
         this.number = 0;
         this.points = []; // of the measurement
@@ -225,7 +226,8 @@ export class VcpViewer extends HTMLElement {
         else if (message.type === 'error') this.fail('scan', message.message);
     }
 
-    show({ width, height, pixels, number, samples, update, fetched, memoryBytes, workers }) {
+    show({ width, height, pixels, number, samples, update, fetched, memoryBytes, workers, moving, ms }) {
+        if (moving) this.movingScale = movingScale(this.movingScale, ms);
         const { canvas } = this.parts;
         if (canvas.width !== width || canvas.height !== height) {
             canvas.width = width;
@@ -235,7 +237,7 @@ export class VcpViewer extends HTMLElement {
         this.loading = update.settled ? '' : `Loading, ${(fetched.bytes / 1e6).toFixed(1)} MB`;
         this.showStatus();
         this.drawOver();
-        this.tell('progress', { number, samples, ...update, ...fetched, memoryBytes, workers });
+        this.tell('progress', { number, samples, ...update, ...fetched, memoryBytes, workers, width, height });
     }
 
     fit() {
@@ -256,7 +258,7 @@ export class VcpViewer extends HTMLElement {
         if (!this.info || !this.worker || this.clientWidth === 0) return;
         const dense = Math.min(devicePixelRatio || 1, 2);
         const pixels = this.clientWidth * this.clientHeight * dense * dense;
-        const scale = dense * Math.min(1, Math.sqrt(kMostPixels / pixels)) * (moving ? kMovingScale : 1);
+        const scale = dense * Math.min(1, Math.sqrt(kMostPixels / pixels)) * (moving ? this.movingScale : 1);
         const width = Math.max(1, Math.round(this.clientWidth * scale)), height = Math.max(1, Math.round(this.clientHeight * scale));
         const { up, forward } = this.orbit.axes(), mode = kModes[this.mode] ?? 0, theme = kTheme[this.dataset.theme];
         this.worker.postMessage({

@@ -83,7 +83,7 @@ function planned({ bands, rows }) {
 /// Casts a sample of the view, and shows the picture where it is worth it. Returns how many samples there are then; 0
 /// where the picture cannot go on, null where it must be begun again.
 async function draw(view, update, sample) {
-    const begun = module.beginSample(sample), { rows } = begun, { width, height } = view;
+    const began = performance.now(), begun = module.beginSample(sample), { rows } = begun, { width, height } = view;
     if (begun.bands === 0) return 0;
     if (sample === 0) plan = planned(begun);
     else if (plan.jobs.some(({ caster }) => !caster.isReady)) return null;
@@ -113,14 +113,14 @@ async function draw(view, update, sample) {
     }
     if (sample === 0) module.endSample(begun);
     costs = ms;
-    if (shows) show(view, update, sample + 1, pixels);
+    if (shows) show(view, update, sample + 1, pixels, performance.now() - began);
     return sample + 1;
 }
 
-function show({ width, height, number }, update, samples, pixels) {
+function show({ width, height, number, moving }, update, samples, pixels, ms) {
     const fetched = { requests: ranges.requests, bytes: ranges.bytes }, ready = casters.filter(caster => caster.isReady);
     const memoryBytes = ready.reduce((sum, caster) => sum + caster.memoryBytes, module.memoryBytes());
-    post('picture', { width, height, pixels, number, samples, fetched, update, memoryBytes, workers: 1 + ready.length },
+    post('picture', { width, height, pixels, number, samples, fetched, update, memoryBytes, workers: 1 + ready.length, moving, ms },
         [pixels.buffer]);
 }
 

@@ -12,7 +12,7 @@ const [web, scan, hostile, ...natives] = process.argv.slice(2);
 const { Module } = await import(pathToFileURL(path.join(web, 'module.js')));
 const { Ranges, joined, parseContentRange, without } = await import(pathToFileURL(path.join(web, 'ranges.js')));
 const { Caster, costsOf, partsOf } = await import(pathToFileURL(path.join(web, 'share.js')));
-const { Orbit, kFieldOfView } = await import(pathToFileURL(path.join(web, 'camera.js')));
+const { Orbit, kFieldOfView, movingScale } = await import(pathToFileURL(path.join(web, 'camera.js')));
 const wasm = fs.readFileSync(path.join(web, 'vcp.wasm'));
 const file = fs.readFileSync(scan);
 
@@ -174,6 +174,19 @@ await check('bands are shared out by what they cost', () => {
     assert.deepEqual(costsOf([], 2), [1, 1]);
     assert.deepEqual(costsOf([1, 2], 4), [1, 1, 2, 2]);
     assert.deepEqual(costsOf([1, 2, 3, 4], 2), [2, 4]);
+});
+
+await check('resolution follows the time that moving pictures take', () => {
+    for (const fullMs of [1, 20, 49, 51, 80, 300, 1000, 3000]) {
+        let scale = 0.4;
+        for (let frame = 0; frame < 12; ++frame) scale = movingScale(scale, fullMs * scale ** 2);
+        const ms = fullMs * scale ** 2;
+        assert.ok(ms <= 50 && (scale === 1 || ms > 25), `${fullMs}: ${scale}`);
+        assert.equal(movingScale(scale, ms), scale, 'it rests');
+    }
+    let scale = 0.4;
+    for (let frame = 0; frame < 12; ++frame) scale = movingScale(scale, 1e5);
+    assert.equal(scale, 0.1, 'no less than that');
 });
 
 /// A worker that casts, in this thread.
