@@ -81,12 +81,13 @@ private:
 
 class PieceMaker {
 public:
-    PieceMaker(const BaseSurface& surface, double height, dvec3 extent, Shell& shell)
+    PieceMaker(const BaseSurface& surface, double height, dvec3 extent, double offset, Shell& shell)
         : surface_(surface),
           directions_(shellDirections(surface)),
           joins_(surface, extent),
           height_(height),
           tileHeight_(extent.z),
+          offset_(offset),
           shell_(shell) {}
 
     std::vector<Piece> all() {
@@ -113,6 +114,7 @@ private:
         std::array<dvec3, 6> world, tile;  // base, then top, by number
         for (int k = 0; k < 3; ++k) {
             world[k] = surface_.positions[t[order[k]]] - shell_.origin;
+            if (offset_ != 0) world[k] += offset_ * directions_[t[order[k]]];
             world[k + 3] = world[k] + height_ * directions_[t[order[k]]];
             tile[k] = dvec3(map[order[k]], 0), tile[k + 3] = dvec3(map[order[k]], tileHeight_);
         }
@@ -158,7 +160,7 @@ private:
     const BaseSurface& surface_;
     std::vector<dvec3> directions_;
     Joins joins_;
-    double height_, tileHeight_;
+    double height_, tileHeight_, offset_;
     Shell& shell_;
 };
 
@@ -257,10 +259,11 @@ std::vector<dvec3> shellDirections(const BaseSurface& surface) {
     return sums;
 }
 
-Result<Shell> buildShell(const BaseSurface& surface, double height, dvec3 extent) {
+Result<Shell> buildShell(const BaseSurface& surface, double height, dvec3 extent, double offset) {
     const auto fail = [](ErrorCode code, const char* message) { return Error{.code = code, .message = message}; };
     if (!(height > 0) || !std::isfinite(height) || !(extent.z > 0))
         return fail(ErrorCode::Usage, "a shell's height must be above 0");
+    if (!std::isfinite(offset)) return fail(ErrorCode::Usage, "a shell's offset must be finite");
     if (surface.uvs.size() != surface.triangles.size())
         return fail(ErrorCode::Usage, "a base surface needs texture coordinates for each triangle");
     if (3 * surface.triangles.size() > kMostPieces)
@@ -272,7 +275,7 @@ Result<Shell> buildShell(const BaseSurface& surface, double height, dvec3 extent
         for (const uint32_t corner : triangle)
             low = glm::min(low, surface.positions[corner]), high = glm::max(high, surface.positions[corner]);
     if (!surface.triangles.empty()) shell.origin = 0.5 * (low + high);
-    const std::vector<Piece> pieces = PieceMaker(surface, height, extent, shell).all();
+    const std::vector<Piece> pieces = PieceMaker(surface, height, extent, offset, shell).all();
     if (pieces.empty())
         return fail(ErrorCode::InvalidInput, shell.flat > 0
                                                  ? "all faces lie on their own backs: the surface has no outside"

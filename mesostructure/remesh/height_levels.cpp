@@ -20,7 +20,7 @@ Result<HeightLevels> HeightLevels::build(const HeightMap& map, const LevelFitOpt
     for (size_t i = 0; i < map.texels.size(); ++i) finest.heights[i] = float(map.texels[i] / 65535.0);
     made.levels_.push_back(std::move(finest));
     made.volumes_.emplace_back();
-    while (made.levels_.back().size != glm::ivec2(1)) {
+    while (made.levels_.back().size != glm::ivec2(1) && int(made.levels_.size()) < options.mostLevels) {
         const glm::ivec2 below = made.levels_.back().size, size(std::max(below.x / 2, 1), std::max(below.y / 2, 1));
         LevelVolume volume;
         HeightLevel level = fitLevel(made.levels_.front(), size, options, volume);

@@ -104,9 +104,11 @@ void addPlaces(RemeshSurface& surface) {
 }  // namespace
 
 Result<RemeshSurface> buildRemeshSurface(const BaseSurface& base, std::shared_ptr<const HeightLevels> heights,
-                                         double height) {
+                                         double height, double offset) {
     if (!(height > 0) || !std::isfinite(height))
         return Error{.code = ErrorCode::Usage, .message = "a displacement's height must be above 0"};
+    if (!std::isfinite(offset))
+        return Error{.code = ErrorCode::Usage, .message = "a displacement's offset must be finite"};
     if (base.uvs.size() != base.triangles.size())
         return invalid("a base surface needs texture coordinates for each triangle");
     VCP_TRY(checkNumbers(base));
@@ -129,19 +131,21 @@ Result<RemeshSurface> buildRemeshSurface(const BaseSurface& base, std::shared_pt
     surface.origin = 0.5 * (low + high);
     const std::vector<dvec3> directions = shellDirections(base);
     for (size_t i = 0; i < base.positions.size(); ++i) {
-        surface.positions.emplace_back(base.positions[i] - surface.origin);
+        const dvec3 bottom = offset == 0 ? base.positions[i] : base.positions[i] + offset * directions[i];
+        surface.positions.emplace_back(bottom - surface.origin);
         surface.directions.emplace_back(height * directions[i]);
         surface.longest = std::max(surface.longest, height * glm::length(directions[i]));
     }
     for (size_t i = 0; i < surface.triangles.size(); ++i)
         for (const uint32_t corner : surface.triangles[i]) {
-            const dvec3 p = base.positions[corner], top = p + height * directions[corner];
+            const dvec3 p = base.positions[corner] + offset * directions[corner],
+                        top = p + height * directions[corner];
             if (directions[corner] == dvec3(0))
                 return invalid(
                     fmt::format("triangle {}: at ({:.9g}, {:.9g}, {:.9g}) the normals of the triangles "
                                 "cancel: there is no direction to displace in",
                                 i, p.x, p.y, p.z));
-            low = glm::min(low, top), high = glm::max(high, top);
+            low = glm::min(low, glm::min(p, top)), high = glm::max(high, glm::max(p, top));
         }
     surface.low = low, surface.high = high;
     addDensities(surface), addSeams(surface), addPlaces(surface);

@@ -38,10 +38,10 @@ struct RemeshSurface {
     uint64_t withoutCorners = 0;                    ///< triangles with two equal corners, which are left out
 };
 
-/// `height`: height of the slab over flat parts, world units. Errors: Usage (heights not above 0); InvalidInput, with
-/// the triangle: no texture coordinates, coordinates that are not finite, an edge of three triangles, a position
+/// `height`: height of the slab over flat parts, world units; `offset`: as in buildShell. Errors: Usage (heights not
+/// above 0, an offset that is not finite); InvalidInput, with the triangle: no texture coordinates, coordinates that are not finite, an edge of three triangles, a position
 /// without a direction, no triangle.
 Result<RemeshSurface> buildRemeshSurface(const BaseSurface& base, std::shared_ptr<const HeightLevels> heights,
-                                         double height);
+                                         double height, double offset = 0);
 
 }  // namespace vcp::meso

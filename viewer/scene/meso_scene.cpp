@@ -85,12 +85,14 @@ public:
             return Error{.code = ErrorCode::Usage,
                          .message = fmt::format("{} takes no normal texture: leave it out, or take another method",
                                                 kRemeshMethod)};
-        auto& levels = levels_[d.asset];
+        auto& levels = levels_[{d.asset, d.withFilter}];
         if (!levels) {
-            VCP_TRY_ASSIGN(auto made, HeightLevels::build(*asset.heights));
+            LevelFitOptions options;
+            if (!d.withFilter) options.mostLevels = 1;
+            VCP_TRY_ASSIGN(auto made, HeightLevels::build(*asset.heights, options));
             levels = std::make_shared<const HeightLevels>(std::move(made));
         }
-        auto made = buildRemeshSurface(base, levels, d.heightScale * tileEdge(base) * asset.extent.z);
+        auto made = buildRemeshSurface(base, levels, d.heightScale * tileEdge(base) * asset.extent.z, d.offset * d.scale);
         if (!made) {
             Error error = made.error();
             if (isFile(d)) error.file = d.base;
@@ -102,7 +104,7 @@ public:
     }
 
 private:
-    std::map<std::string, std::shared_ptr<const HeightLevels>> levels_;
+    std::map<std::pair<std::string, bool>, std::shared_ptr<const HeightLevels>> levels_;
 };
 
 void warn(const MesoSurfaceDescription& d, const BaseSurface& base, const Shell& shell,
@@ -180,7 +182,7 @@ Result<MesoScene> makeMesoScene(std::span<const MesoSurfaceDescription> descript
             return d.from.blamed(std::move(error));
         }
         const double edge = tileEdge(*base);
-        auto shell = buildShell(*base, d.heightScale * edge * asset->extent.z, asset->extent);
+        auto shell = buildShell(*base, d.heightScale * edge * asset->extent.z, asset->extent, d.offset * d.scale);
         if (!shell) {
             Error error = shell.error();
             if (isFile(d)) error.file = d.base;

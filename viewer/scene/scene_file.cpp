@@ -190,7 +190,8 @@ private:
         if (!isObject(json, at)) return made;
         onlyKeys(json, at, {"asset", "surface", "subdivide", "tiles",          "height", "translate", "scale",
                             "up",    "colour",  "texture",   "normal_texture", "method", "cell",      "grid",
-                            "cones", "steps",   "rank",      "directions",     "base",   "far"});
+                            "cones", "steps",   "rank",      "directions",     "base",   "far",       "offset",
+                            "filter"});
         if (!json.contains("asset"))
             wrong(at, "\"asset\" is missing");
         else
@@ -203,6 +204,8 @@ private:
         if (json.contains("subdivide")) made.subdivide = times(json["subdivide"], at + "/subdivide");
         if (json.contains("tiles")) made.tiles = scale(json["tiles"], at + "/tiles");
         if (json.contains("height")) made.heightScale = scale(json["height"], at + "/height");
+        if (json.contains("offset")) made.offset = number(json["offset"], at + "/offset");
+        if (json.contains("filter")) made.withFilter = flag(json["filter"], at + "/filter");
         if (json.contains("translate")) made.place = triple(json["translate"], at + "/translate");
         if (json.contains("scale")) made.scale = scale(json["scale"], at + "/scale");
         if (json.contains("up")) made.up = upAxis(json["up"], at + "/up");

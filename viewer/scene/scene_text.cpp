@@ -37,6 +37,8 @@ Json surfaceJson(const MesoSurfaceDescription& surface) {
     put("subdivide", surface.subdivide, usual.subdivide);
     put("tiles", surface.tiles, usual.tiles);
     put("height", surface.heightScale, usual.heightScale);
+    put("offset", surface.offset, usual.offset);
+    put("filter", surface.withFilter, usual.withFilter);
     if (surface.place != usual.place) json["translate"] = triple(surface.place);
     put("scale", surface.scale, usual.scale);
     if (surface.up != usual.up) json["up"] = "y";
