@@ -46,8 +46,8 @@ struct Shell {
 
 /// `height`: height of the shell over flat parts, world units; `extent`: extent of the tile, tile units; `offset`: how
 /// far the shell's bottom lies over the base, along the same directions, world units; below 0 under it. Errors: Usage
-/// (heights not above 0, an offset that is not finite, not a map of each triangle); InvalidInput (no triangle with area, coordinates that are not
-/// finite, also in single precision); Limit (2^24 pieces).
+/// (heights not above 0, an offset that is not finite, not a map of each triangle); InvalidInput (no triangle with
+/// area, coordinates that are not finite, also in single precision); Limit (2^24 pieces).
 Result<Shell> buildShell(const BaseSurface& surface, double height, glm::dvec3 extent, double offset = 0);
 
 /// Returns the direction of each position in heights, of at most 3: what a shell's corners are moved along. 0 where the

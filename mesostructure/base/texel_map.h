@@ -21,8 +21,9 @@
 namespace vcp::meso {
 
 struct TexelMap {
-    int size = 0;                                   ///< texels an edge
-    std::vector<std::array<glm::dvec2, 3>> places;  ///< of the triangles' corners, in texels; texel (i, j) lies at (i, j)
+    int size = 0;  ///< texels an edge
+    std::vector<std::array<glm::dvec2, 3>>
+        places;              ///< of the triangles' corners, in texels; texel (i, j) lies at (i, j)
     std::vector<int> steps;  ///< of an atlas: texel steps along each edge of a triangle; else empty
 
     [[nodiscard]] bool isAtlas() const { return !steps.empty(); }

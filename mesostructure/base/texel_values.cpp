@@ -104,8 +104,8 @@ private:
             for (int s = 0; s <= fewest * times; ++s) {
                 const int low = s / times, rest = s % times;
                 const float part = float(rest) / float(times);
-                onSide(side, s) = rest == 0 ? values[size_t(low)]
-                                            : values[size_t(low)] * (1 - part) + values[size_t(low) + 1] * part;
+                onSide(side, s) =
+                    rest == 0 ? values[size_t(low)] : values[size_t(low)] * (1 - part) + values[size_t(low) + 1] * part;
             }
         }
     }

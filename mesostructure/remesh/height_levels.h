@@ -43,8 +43,8 @@ struct LevelFitOptions {
     LevelFit fit = LevelFit::Least;
     double gap = 0.01;         ///< LevelFit::Least ends where volume and bound differ by this part
     int mostIterations = 400;  ///< for each level
-    /// Levels that are made, with the map. 1 is for atlases: coarser levels mix charts that have nothing to do with each
-    /// other.
+    /// Levels that are made, with the map. 1 is for atlases: coarser levels mix charts that have nothing to do with
+    /// each other.
     int mostLevels = 32;
 };
 

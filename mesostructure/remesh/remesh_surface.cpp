@@ -138,8 +138,7 @@ Result<RemeshSurface> buildRemeshSurface(const BaseSurface& base, std::shared_pt
     }
     for (size_t i = 0; i < surface.triangles.size(); ++i)
         for (const uint32_t corner : surface.triangles[i]) {
-            const dvec3 p = base.positions[corner] + offset * directions[corner],
-                        top = p + height * directions[corner];
+            const dvec3 p = base.positions[corner] + offset * directions[corner], top = p + height * directions[corner];
             if (directions[corner] == dvec3(0))
                 return invalid(
                     fmt::format("triangle {}: at ({:.9g}, {:.9g}, {:.9g}) the normals of the triangles "

@@ -39,8 +39,8 @@ struct RemeshSurface {
 };
 
 /// `height`: height of the slab over flat parts, world units; `offset`: as in buildShell. Errors: Usage (heights not
-/// above 0, an offset that is not finite); InvalidInput, with the triangle: no texture coordinates, coordinates that are not finite, an edge of three triangles, a position
-/// without a direction, no triangle.
+/// above 0, an offset that is not finite); InvalidInput, with the triangle: no texture coordinates, coordinates that
+/// are not finite, an edge of three triangles, a position without a direction, no triangle.
 Result<RemeshSurface> buildRemeshSurface(const BaseSurface& base, std::shared_ptr<const HeightLevels> heights,
                                          double height, double offset = 0);
 

@@ -11,6 +11,7 @@
 #include "viewer/asset/height_image.h"
 #include "viewer/asset/share_out.h"
 #include "viewer/asset/tile_mesh.h"
+#include "viewer/command/command_meso_bake.h"
 #include "viewer/command/command_meso_base.h"
 #include "viewer/command/commands.h"
 #include "viewer/command/parsed_option.h"
@@ -348,8 +349,9 @@ Command addMeso(CLI::App& vcp) {
     CLI::App* app = vcp.add_subcommand("meso", "Make mesostructure: fine relief for the surfaces of scenes");
     app->require_subcommand(1);
     const RunCommand build = addMesoBuild(*app), render = addMesoRender(*app);
-    const RunCommand base = addMesoBase(*app);
-    const CLI::App *renderApp = app->get_subcommand("render"), *baseApp = app->get_subcommand("base");
+    const RunCommand base = addMesoBase(*app), bake = addMesoBake(*app);
+    const CLI::App *renderApp = app->get_subcommand("render"), *baseApp = app->get_subcommand("base"),
+                   *bakeApp = app->get_subcommand("bake");
     auto info = std::make_shared<InfoMeso>();
     CLI::App* infoApp = app->add_subcommand("info", "Say what is in an asset");
     infoApp->add_option("FILE", info->file, "An asset made by `vcp meso build`")->type_name("")->required();
@@ -358,6 +360,7 @@ Command addMeso(CLI::App& vcp) {
                 return infoApp->parsed()     ? runInfo(*info)
                        : renderApp->parsed() ? render()
                        : baseApp->parsed()   ? base()
+                       : bakeApp->parsed()   ? bake()
                                              : build();
             }};
 }

@@ -54,15 +54,18 @@ std::vector<uint8_t> encodePng(const std::vector<uint8_t>& rows, int bits, int c
     return bytes;
 }
 
+void appendBigEndian(uint32_t value, std::vector<uint8_t>& rows) {
+    rows.push_back(uint8_t(value >> 8));
+    rows.push_back(uint8_t(value & 255));
+}
+
 std::vector<uint8_t> greyRows(std::span<const float> depth) {
     const DepthRange range = depthRange(depth);
     const double scale = range.farthest > range.nearest ? 65534.0 / (double(range.farthest) - range.nearest) : 0;
     std::vector<uint8_t> rows;
     rows.reserve(2 * depth.size());
     for (const float d : depth) {
-        const auto grey = std::isfinite(d) ? uint32_t(std::lround(1 + scale * (double(d) - range.nearest))) : 0u;
-        rows.push_back(uint8_t(grey >> 8));
-        rows.push_back(uint8_t(grey & 255));
+        appendBigEndian(std::isfinite(d) ? uint32_t(std::lround(1 + scale * (double(d) - range.nearest))) : 0u, rows);
     }
     return rows;
 }
@@ -111,6 +114,14 @@ Result<void> writeDepth(std::span<const float> depth, uint32_t width, uint32_t h
     return writePlane(kind == OutputKind::Pfm ? encodePfm(depth.data(), 1, width, height)
                                               : encodePng(greyRows(depth), 16, PNG_COLOR_TYPE_GRAY, width, height),
                       kind, path, rules);
+}
+
+Result<void> writeGrey16(std::span<const uint16_t> values, uint32_t width, uint32_t height, const fs::path& path,
+                         const OutputRules& rules) {
+    std::vector<uint8_t> rows;
+    rows.reserve(2 * values.size());
+    for (const uint16_t value : values) appendBigEndian(value, rows);
+    return writePlane(encodePng(rows, 16, PNG_COLOR_TYPE_GRAY, width, height), OutputKind::Png, path, rules);
 }
 
 Result<void> writeNormals(std::span<const glm::vec3> normals, uint32_t width, uint32_t height, const fs::path& path,

@@ -1,4 +1,4 @@
-// Writes depth and normals as files, each whole or absent (octree/io/output_file.h).
+// Writes depth, normals and other numbers as files, each whole or absent (octree/io/output_file.h).
 //
 //   .pfm   32-bit float, lower row first, little endian (scale -1), as the format wants it. Depth: one
 //          channel, world units along the ray, infinity where nothing was hit. Normals: three channels, world
@@ -31,6 +31,10 @@ Result<void> writeDepth(std::span<const float> depth, uint32_t width, uint32_t h
 /// Does the same for unit normals.
 Result<void> writeNormals(std::span<const glm::vec3> normals, uint32_t width, uint32_t height,
                           const std::filesystem::path& path, const OutputRules& rules = {});
+
+/// Writes numbers as 16-bit grey, upper row first: width * height values. Errors: Limit (no memory), Io.
+Result<void> writeGrey16(std::span<const uint16_t> values, uint32_t width, uint32_t height,
+                         const std::filesystem::path& path, const OutputRules& rules = {});
 
 /// Returns true when writeDepth and writeNormals know the extension.
 bool isImagePlanePath(const std::filesystem::path& path);

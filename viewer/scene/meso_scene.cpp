@@ -92,7 +92,8 @@ public:
             VCP_TRY_ASSIGN(auto made, HeightLevels::build(*asset.heights, options));
             levels = std::make_shared<const HeightLevels>(std::move(made));
         }
-        auto made = buildRemeshSurface(base, levels, d.heightScale * tileEdge(base) * asset.extent.z, d.offset * d.scale);
+        auto made =
+            buildRemeshSurface(base, levels, d.heightScale * tileEdge(base) * asset.extent.z, d.offset * d.scale);
         if (!made) {
             Error error = made.error();
             if (isFile(d)) error.file = d.base;

@@ -50,12 +50,12 @@ struct MesoSurfaceDescription {
     double tiles = 4;            ///< tile edges along the base (makeBaseSurface, readBaseMesh)
     int subdivide = 0;           ///< times that Loop's rules are applied to the base (meso::subdivided)
     double heightScale = 1;      ///< height of the slab; 1: in the asset's own proportion to its tile's edge
-    double offset = 0;           ///< by how much the slab's bottom lies over the base, in the base's units; below 0 under
-    bool withFilter = true;      ///< kRemeshMethod: with coarser levels of the heights
-    glm::dvec3 place{0};         ///< the base's origin, world
-    double scale = 1;            ///< scale of the base, of mesh files too
-    UpAxis up = UpAxis::Z;       ///< which way the base's z points; mesh files stay as they are
-    glm::vec3 colour{0.8f};      ///< encoded
+    double offset = 0;       ///< by how much the slab's bottom lies over the base, in the base's units; below 0 under
+    bool withFilter = true;  ///< kRemeshMethod: with coarser levels of the heights
+    glm::dvec3 place{0};     ///< the base's origin, world
+    double scale = 1;        ///< scale of the base, of mesh files too
+    UpAxis up = UpAxis::Z;   ///< which way the base's z points; mesh files stay as they are
+    glm::vec3 colour{0.8f};  ///< encoded
     std::string colourTexture, normalTexture;  ///< pictures over the tile (viewer/scene/tile_texture.h); empty: none
     bool withBase = true;
     bool withFar = true;  ///< far away it is not marched (MesoLook::errorPixels)

@@ -188,10 +188,9 @@ private:
         MesoSurfaceDescription made;
         made.method.name = "boxes";
         if (!isObject(json, at)) return made;
-        onlyKeys(json, at, {"asset", "surface", "subdivide", "tiles",          "height", "translate", "scale",
-                            "up",    "colour",  "texture",   "normal_texture", "method", "cell",      "grid",
-                            "cones", "steps",   "rank",      "directions",     "base",   "far",       "offset",
-                            "filter"});
+        onlyKeys(json, at, {"asset",  "surface",    "subdivide",      "tiles",  "height", "translate", "scale", "up",
+                            "colour", "texture",    "normal_texture", "method", "cell",   "grid",      "cones", "steps",
+                            "rank",   "directions", "base",           "far",    "offset", "filter"});
         if (!json.contains("asset"))
             wrong(at, "\"asset\" is missing");
         else

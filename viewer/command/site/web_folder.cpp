@@ -7,13 +7,16 @@
 #include <array>
 #include <cerrno>
 #include <cstdio>
+#include <span>
 #include <string>
 #include <string_view>
 #include <system_error>
+#include <vector>
 
 #include <fmt/format.h>
 
 #include "octree/io/durable_file.h"
+#include "octree/io/output_folder.h"
 
 namespace vcp {
 
@@ -26,25 +29,19 @@ constexpr std::array<std::string_view, 13> kViewerFiles{
     kPage,       "vcp-viewer.js", "vcp-viewer.d.ts", "worker.js", "module.js",     "camera.js", "markup.js",
     "ranges.js", "caster.js",     "share.js",        "fzstd.js",  "fzstd.LICENSE", "vcp.wasm"};
 
+/// All that a published folder holds.
+std::span<const std::string_view> folderFiles() {
+    static const std::vector<std::string_view> names = [] {
+        std::vector<std::string_view> all(kViewerFiles.begin(), kViewerFiles.end());
+        all.emplace_back(kScanInFolder);
+        return all;
+    }();
+    return names;
+}
+
 Error io(const fs::path& file, const char* what, const std::error_code& failed) {
     return systemError(file, what, failed.value());
 }
-
-/// Removes a folder that was not finished.
-class Unfinished {
-public:
-    explicit Unfinished(fs::path folder) : folder_(std::move(folder)) {}
-    Unfinished(const Unfinished&) = delete;
-    Unfinished& operator=(const Unfinished&) = delete;
-    ~Unfinished() {
-        std::error_code ignored;
-        fs::remove_all(folder_, ignored);
-    }
-    [[nodiscard]] const fs::path& folder() const { return folder_; }
-
-private:
-    fs::path folder_;
-};
 
 Result<uint64_t> copyInto(const fs::path& from, const fs::path& to) {
     std::error_code failed;
@@ -59,37 +56,6 @@ Result<uint64_t> copyInto(const fs::path& from, const fs::path& to) {
     const uint64_t bytes = fs::file_size(to, failed);
     if (failed) return io(to, "its size cannot be asked", failed);
     return bytes;
-}
-
-/// Whether a folder may be replaced. Errors: Usage, with what stands in the way.
-Result<void> checkReplaceable(const fs::path& folder, bool overwrite) {
-    std::error_code failed;
-    const fs::file_status there = fs::symlink_status(folder, failed);
-    if (there.type() == fs::file_type::not_found) return {};
-    const auto refuse = [&](std::string message) {
-        return Error{.code = ErrorCode::Usage, .message = std::move(message), .file = folder.string()};
-    };
-    if (there.type() != fs::file_type::directory) return refuse("is there already, and no folder");
-    fs::directory_iterator entries(folder, failed);
-    if (failed) return io(folder, "cannot be read", failed);
-    for (const fs::directory_entry& entry : entries) {
-        const std::string name = entry.path().filename().string();
-        if (!overwrite)
-            return refuse("is there already and not empty; --overwrite replaces it, but for its index.html");
-        const bool isOurs =
-            name == kScanInFolder || std::find(kViewerFiles.begin(), kViewerFiles.end(), name) != kViewerFiles.end();
-        if (!isOurs || !entry.is_regular_file(failed))
-            return refuse(fmt::format("holds {}, which is not of a published scan; choose another folder", name));
-    }
-    return {};
-}
-
-/// Gives the finished folder its name; what had it before goes.
-Result<void> putInPlace(const fs::path& made, const fs::path& folder) {
-    if (::renameat2(AT_FDCWD, made.c_str(), AT_FDCWD, folder.c_str(), RENAME_NOREPLACE) == 0) return {};
-    // The name is taken: the two are exchanged, and the old one is removed with what was not finished.
-    if (::renameat2(AT_FDCWD, made.c_str(), AT_FDCWD, folder.c_str(), RENAME_EXCHANGE) == 0) return {};
-    return systemError(folder, "cannot be replaced", errno);
 }
 
 }  // namespace
@@ -113,21 +79,21 @@ Result<fs::path> findWebViewer(const fs::path& asked) {
 }
 
 Result<uint64_t> writeWebFolder(const fs::path& viewer, const fs::path& scan, const fs::path& named, bool overwrite) {
-    const fs::path folder = named.has_filename() ? named : named.parent_path();
-    VCP_TRY(checkReplaceable(folder, overwrite));
-    const Unfinished made(fs::path(folder) += fmt::format(".unfinished-{}", ::getpid()));
+    VCP_TRY_ASSIGN(auto made,
+                   OutputFolder::create(named, {.names = folderFiles(),
+                                                .ofWhat = "a published scan",
+                                                .overwrite = overwrite,
+                                                .howToReplace = "--overwrite replaces it, but for its index.html"}));
+    const fs::path& to = made.unfinished();
     std::error_code failed;
-    if (!fs::create_directory(made.folder(), failed)) return io(made.folder(), "cannot be made", failed);
     uint64_t bytes = 0;
     for (const std::string_view name : kViewerFiles) {
-        const bool isKept = name == kPage && fs::is_regular_file(folder / kPage, failed);
-        VCP_TRY_ASSIGN(const uint64_t copied, copyInto((isKept ? folder : viewer) / name, made.folder() / name));
+        const bool isKept = name == kPage && fs::is_regular_file(made.folder() / kPage, failed);
+        VCP_TRY_ASSIGN(const uint64_t copied, copyInto((isKept ? made.folder() : viewer) / name, to / name));
         bytes += copied;
     }
-    VCP_TRY_ASSIGN(const uint64_t copied, copyInto(scan, made.folder() / kScanInFolder));
-    VCP_TRY(syncFolder(made.folder()));
-    VCP_TRY(putInPlace(made.folder(), folder));
-    VCP_TRY(syncFolder(folder.parent_path()));
+    VCP_TRY_ASSIGN(const uint64_t copied, copyInto(scan, to / kScanInFolder));
+    VCP_TRY(made.commit());
     return bytes + copied;
 }
 

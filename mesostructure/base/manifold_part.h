@@ -1,0 +1,15 @@
+// What of a triangle mesh can be a surface of half-edges.
+#pragma once
+
+#include <cstdint>
+
+#include "mesostructure/base_surface.h"
+
+namespace vcp::meso {
+
+/// Leaves out triangles with two equal corners, and those that run along an edge in the direction of an earlier one:
+/// then each edge has two triangles at most, turned to one side. Corners must be joined (joinPositions). Returns how
+/// many triangles went, but for those with equal corners. Memory: 48 bytes a triangle.
+uint64_t keepManifoldPart(BaseSurface& surface);
+
+}  // namespace vcp::meso

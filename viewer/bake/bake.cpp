@@ -1,0 +1,194 @@
+#include "viewer/bake/bake.h"
+
+#include <cmath>
+
+#include <fmt/format.h>
+#include <glm/geometric.hpp>
+
+#include "builder/measure/mesh_deviation.h"
+#include "mesostructure/asset_file.h"
+#include "mesostructure/base/decimation.h"
+#include "mesostructure/base/manifold_part.h"
+#include "mesostructure/base/surface_edges.h"
+#include "mesostructure/shell.h"
+#include "viewer/bake/bake_files.h"
+#include "viewer/bake/displaced_mesh.h"
+#include "viewer/export/surface_mesh.h"
+#include "viewer/scene/base_mesh.h"
+
+namespace vcp {
+
+namespace {
+
+using namespace meso;
+
+constexpr uint64_t kMostOfBase = 1'000'000, kMeasured = 200'000, kForReach = 50'000;
+
+/// Where the parts of the work lie in the whole.
+struct Part {
+    const char* name;
+    double from, to;
+};
+constexpr Part kReading{"reading the scan", 0, 0.1}, kDecimating{"collapsing edges", 0.1, 0.3},
+    kReaching{"measuring the base", 0.3, 0.32}, kSampling{"sampling", 0.32, 0.85}, kWriting{"writing", 0.85, 0.9},
+    kMeasuring{"measuring", 0.9, 0.95}, kMeasuringBack{"measuring back", 0.95, 1};
+
+/// An error of the base is said with the base's name.
+Error named(Error error, const std::string& name) {
+    if (error.file.empty() && error.code != ErrorCode::Cancelled) error.file = name;
+    return error;
+}
+
+class Baker {
+public:
+    Baker(const std::shared_ptr<const ByteReader>& reader, const Dataset& dataset, const std::filesystem::path& folder,
+          const BakeOptions& options)
+        : reader_(reader), dataset_(dataset), folder_(folder), options_(options) {}
+
+    Result<BakeFigures> run() {
+        figures_.scanTriangles = dataset_.header.triangles;
+        if (dataset_.header.method != Method::Certified)
+            return Error{.code = ErrorCode::Unsupported,
+                         .message = "was built by the paper's method; build it by the other to bake it",
+                         .file = reader_->name()};
+        if (options_.base.empty() || options_.measured) VCP_TRY(readScan());
+        VCP_TRY(options_.base.empty() ? decimateScan() : readBase());
+        VCP_TRY_ASSIGN(const TexelMap map, mapOf());
+        if (!options_.measured) scan_ = {};
+        const std::vector<glm::dvec3> directions = shellDirections(base_);
+        const BaseFrames frames = framesOf(base_, map, directions);
+        auto maps = bakeMaps(reader_, dataset_, base_, map, frames, directions,
+                             {.reach = figures_.reach,
+                              .withColour = options_.withColour,
+                              .memoryBytes = options_.memoryBytes,
+                              .progress = progress(kSampling)});
+        if (!maps) return named(maps.error(), baseName());
+        figures_.baseTriangles = base_.triangles.size();
+        figures_.isAtlas = map.isAtlas();
+        figures_.offset = maps->heights.offset, figures_.range = maps->heights.range;
+        figures_.shares = maps->shares;
+        if (!at(kWriting, 0)) return Error::cancelled();
+        const std::string name = std::filesystem::path(reader_->name()).stem().string();
+        VCP_TRY_ASSIGN(figures_.bytes, writeBaked(folder_, name, base_, map, frames, *maps));
+        std::error_code ignored;
+        figures_.baseBytes = std::filesystem::file_size(folder_ / "base.obj", ignored);
+        figures_.heightBytes = std::filesystem::file_size(folder_ / "heights.meso", ignored);
+        maps = BakedMaps();
+        if (options_.measured) VCP_TRY(measure());
+        return figures_;
+    }
+
+private:
+    [[nodiscard]] bool at(const Part& part, double fraction) const {
+        return !options_.progress || options_.progress(part.name, part.from + (part.to - part.from) * fraction);
+    }
+    [[nodiscard]] std::function<bool(double)> progress(const Part& part) const {
+        return [this, part](double fraction) { return at(part, fraction); };
+    }
+    /// What errors of the base are said of.
+    [[nodiscard]] std::string baseName() const {
+        return options_.base.empty() ? reader_->name() : options_.base.string();
+    }
+
+    Result<void> readScan() {
+        const uint64_t count = dataset_.header.triangles;
+        const auto tooLarge = [&](std::string why) {
+            return Error{
+                .code = ErrorCode::Limit,
+                .message = fmt::format("has {} triangles, {}; {}", count, why,
+                                       options_.base.empty() ? "give a base of your own" : "leave out the measuring"),
+                .file = reader_->name()};
+        };
+        if (count > kMostDecimated)
+            return tooLarge(fmt::format("and at most {} are held in memory here", kMostDecimated));
+        if (count * kDecimationBytes > options_.memoryBytes)
+            return tooLarge(
+                fmt::format("which takes {} MiB of memory, more than the memory cap", count * kDecimationBytes >> 20));
+        VCP_TRY_ASSIGN(const auto cut, SurfaceCut::create(dataset_, reader_->name(), UINT32_MAX));
+        if (!cut.isMesh() && options_.base.empty())
+            return Error{.code = ErrorCode::Unsupported,
+                         .message =
+                             "its finest level is not the mesh itself, which a base could be made from; build it "
+                             "anew, or give a base of your own",
+                         .file = reader_->name()};
+        VCP_TRY_ASSIGN(scan_, loadSurface(*reader_, cut, {.colour = false, .progress = progress(kReading)}));
+        if (scan_.mesh.triangles.empty())
+            return Error{.code = ErrorCode::InvalidInput, .message = "has no triangle", .file = reader_->name()};
+        return {};
+    }
+
+    Result<void> decimateScan() {
+        BaseSurface surface{scan_.mesh.positions, scan_.mesh.triangles, {}};
+        joinPositions(surface);
+        figures_.leftOut = keepManifoldPart(surface);
+        auto made = decimated(surface, {.triangles = options_.triangles, .progress = progress(kDecimating)});
+        if (!made) return named(made.error(), reader_->name());
+        base_ = *std::move(made);
+        if (options_.reach > 0) {
+            figures_.reach = options_.reach;
+            return {};
+        }
+        const IndexedMesh mesh{base_.positions, base_.triangles, {}};
+        const DeviationTarget target(mesh);
+        VCP_TRY_ASSIGN(const auto away,
+                       measureDeviation(scan_.mesh, target, {.samples = kForReach, .progress = progress(kReaching)}));
+        figures_.reach = std::max(1.5 * away.absoluteQuantile(1), 4 * dataset_.cellOf(dataset_.header.levels - 1));
+        return {};
+    }
+
+    Result<void> readBase() {
+        LoadOptions loading;
+        loading.coordinates = Coordinates::IfAny;
+        loading.mostTriangles = kMostOfBase, loading.mostPositions = 3 * kMostOfBase;
+        loading.progress = progress(kDecimating);
+        VCP_TRY_ASSIGN(auto mesh, loadMesh(options_.base, loading));
+        base_ = {std::move(mesh.positions), std::move(mesh.triangles), std::move(mesh.coordinates)};
+        joinPositions(base_);
+        if (const auto edges = edgesOf(base_); !edges) return named(edges.error(), baseName());
+        const Box bounds = boundsOf(dataset_.header);
+        figures_.reach = options_.reach > 0 ? options_.reach : 0.02 * glm::distance(bounds.low, bounds.high);
+        return {};
+    }
+
+    Result<TexelMap> mapOf() {
+        const bool isGiven = !base_.uvs.empty() && !options_.newMap;
+        auto map = isGiven ? givenMap(base_, options_.texels) : makeAtlas(base_, options_.texels);
+        if (!map) return named(map.error(), baseName());
+        return map;
+    }
+
+    /// Measures what was written, read again, against the scan.
+    Result<void> measure() {
+        VCP_TRY_ASSIGN(const auto surface, readBaseMesh(folder_ / "base.obj", 1));
+        VCP_TRY_ASSIGN(const auto asset, readAsset(folder_ / "heights.meso"));
+        VCP_TRY_ASSIGN(const IndexedMesh displaced, displacedMesh(surface, *asset.heights, figures_.offset));
+        VCP_TRY_ASSIGN(figures_.scanToBase, distances(scan_.mesh, displaced, kMeasuring));
+        VCP_TRY_ASSIGN(figures_.baseToScan, distances(displaced, scan_.mesh, kMeasuringBack));
+        return {};
+    }
+
+    Result<Quantiles> distances(const IndexedMesh& from, const IndexedMesh& to, const Part& part) {
+        const DeviationTarget target(to);
+        VCP_TRY_ASSIGN(const auto found,
+                       measureDeviation(from, target, {.samples = kMeasured, .progress = progress(part)}));
+        return Quantiles{found.absoluteQuantile(0.5), found.absoluteQuantile(0.95), found.absoluteQuantile(0.99),
+                         found.absoluteQuantile(1)};
+    }
+
+    const std::shared_ptr<const ByteReader>& reader_;
+    const Dataset& dataset_;
+    const std::filesystem::path& folder_;
+    const BakeOptions& options_;
+    LoadedSurface scan_;
+    BaseSurface base_;
+    BakeFigures figures_;
+};
+
+}  // namespace
+
+Result<BakeFigures> bake(const std::shared_ptr<const ByteReader>& reader, const Dataset& dataset,
+                         const std::filesystem::path& folder, const BakeOptions& options) {
+    return Baker(reader, dataset, folder, options).run();
+}
+
+}  // namespace vcp
