@@ -70,8 +70,8 @@ public:
     bool lay(double perUnit) {
         std::vector<int> steps;
         for (const double edge : edges_) {
-            int n = kLeastSteps;
-            while (n < kMostSteps && n * std::sqrt(2.0) < edge * perUnit) n *= 2;
+            int n = kLeastChartSteps;
+            while (n < kMostChartSteps && n * std::sqrt(2.0) < edge * perUnit) n *= 2;
             steps.push_back(n);
         }
         std::vector<uint32_t> order(steps.size());
@@ -152,7 +152,7 @@ Result<TexelMap> makeAtlas(const BaseSurface& surface, int size) {
     if (surface.triangles.size() > size_t(size) * size_t(size) / 16 || !maker.lay(0)) return tooMany();
     // The greatest scale that fits, by halving.
     const double longest = maker.longest();
-    double fits = 0, most = longest > 0 ? 2.0 * kMostSteps / longest : 0;
+    double fits = 0, most = longest > 0 ? 2.0 * kMostChartSteps / longest : 0;
     for (int i = 0; i < 40 && most > 0; ++i) {
         const double middle = 0.5 * (fits + most);
         (maker.lay(middle) ? fits : most) = middle;

@@ -34,10 +34,10 @@ struct TexelMap {
     [[nodiscard]] glm::ivec2 onEdge(size_t triangle, int k, int s) const;
 };
 
-inline constexpr int kLeastSteps = 2, kMostSteps = 1024;
+inline constexpr int kLeastChartSteps = 2, kMostChartSteps = 1024;
 
 /// Makes an atlas of all triangles. `size`: texels an edge, 8 to kMaxGridEdge. Errors: Limit (the charts do not fit
-/// even with kLeastSteps).
+/// even with kLeastChartSteps).
 Result<TexelMap> makeAtlas(const BaseSurface& surface, int size);
 
 /// Takes the surface's own coordinates, from 0 to 1, as other programs do: the middle of the texel at the lower left

@@ -91,7 +91,7 @@ private:
     }
 
     void join(const std::vector<Side>& sides) {
-        int fewest = kMostSteps;
+        int fewest = kMostChartSteps;
         for (const Side& side : sides) fewest = std::min(fewest, map_.steps[side.triangle]);
         std::vector<Value> values(size_t(fewest) + 1, Value(std::numeric_limits<float>::quiet_NaN()));
         for (const Side& side : sides) {

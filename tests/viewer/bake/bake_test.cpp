@@ -1,0 +1,261 @@
+// What is baked against truths in closed form.
+#include "viewer/bake/bake.h"
+
+#include <cmath>
+#include <fstream>
+#include <map>
+
+#include <gtest/gtest.h>
+#include <glm/geometric.hpp>
+
+#include "mesostructure/asset_file.h"
+#include "mesostructure/shell.h"
+#include "octree/io/byte_reader.h"
+#include "tests/support/built_mesh.h"
+#include "viewer/bake/displaced_mesh.h"
+#include "viewer/scene/base_mesh.h"
+
+namespace vcp {
+namespace {
+
+using namespace meso;
+using glm::dvec2, glm::dvec3;
+
+double bumpyRadius(dvec3 p) {
+    const dvec3 n = glm::normalize(p);
+    return 1 + 0.02 * std::sin(5 * n.x) * std::sin(4 * n.y + 1) * std::cos(6 * n.z);
+}
+
+/// A sphere of radius 1 with bumps; its facets are within 1e-4 of the formula: edges of 0.016 on curvatures up to 3.
+IndexedMesh bumpySphere() {
+    IndexedMesh mesh = test::sphereMesh(dvec3(0), 1, 200);
+    for (dvec3& p : mesh.positions) p *= bumpyRadius(p);
+    return mesh;
+}
+
+/// An octahedron, each triangle of which is halved along its edges `times` times, on the unit sphere.
+BaseSurface roundOctahedron(int times) {
+    BaseSurface made{{{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}},
+                     {{0, 2, 4}, {2, 1, 4}, {1, 3, 4}, {3, 0, 4}, {2, 0, 5}, {1, 2, 5}, {3, 1, 5}, {0, 3, 5}},
+                     {}};
+    for (int i = 0; i < times; ++i) {
+        std::map<std::pair<uint32_t, uint32_t>, uint32_t> middles;
+        const auto middle = [&](uint32_t a, uint32_t b) {
+            const auto [at, isNew] = middles.try_emplace(std::minmax(a, b), uint32_t(made.positions.size()));
+            if (isNew) made.positions.push_back(glm::normalize(made.positions[a] + made.positions[b]));
+            return at->second;
+        };
+        std::vector<std::array<uint32_t, 3>> finer;
+        for (const auto& t : made.triangles) {
+            const uint32_t a = middle(t[0], t[1]), b = middle(t[1], t[2]), c = middle(t[2], t[0]);
+            finer.insert(finer.end(), {{t[0], a, c}, {a, t[1], b}, {c, b, t[2]}, {a, b, c}});
+        }
+        made.triangles = finer;
+    }
+    return made;
+}
+
+/// The open unit square, two triangles with their coordinates.
+BaseSurface unitSquare() {
+    const std::array<dvec2, 3> a{dvec2(0, 0), {1, 0}, {1, 1}}, b{dvec2(0, 0), {1, 1}, {0, 1}};
+    return {{{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}}, {{0, 1, 2}, {0, 2, 3}}, {a, b}};
+}
+
+/// A grid z(x, y) over [low, high]^2.
+template <class Height>
+IndexedMesh sheet(double low, double high, uint32_t n, const Height& height) {
+    IndexedMesh mesh;
+    for (uint32_t j = 0; j <= n; ++j)
+        for (uint32_t i = 0; i <= n; ++i) {
+            const double x = low + (high - low) * i / n, y = low + (high - low) * j / n;
+            mesh.positions.push_back({x, y, height(x, y)});
+        }
+    for (uint32_t j = 0; j < n; ++j)
+        for (uint32_t i = 0; i < n; ++i) {
+            const uint32_t a = i + (n + 1) * j, b = a + 1, c = b + n + 1, d = a + n + 1;
+            mesh.triangles.push_back({a, b, c}), mesh.triangles.push_back({a, c, d});
+        }
+    return mesh;
+}
+
+struct Baked {
+    BaseSurface base;
+    TexelMap map;
+    BaseFrames frames;
+    std::vector<dvec3> directions;
+    Result<BakedMaps> maps = BakedMaps();
+};
+
+Baked bakeOver(const test::BuiltMesh& scan, const BaseSurface& base, int size, double reach, bool given) {
+    Baked made;
+    made.base = base;
+    made.map = given ? *givenMap(base, size) : *makeAtlas(base, size);
+    made.directions = shellDirections(base);
+    made.frames = framesOf(base, made.map, made.directions);
+    const std::shared_ptr<const ByteReader> reader = *openFile(scan.file());
+    made.maps =
+        bakeMaps(reader, scan.cache().dataset(), base, made.map, made.frames, made.directions, {.reach = reach});
+    return made;
+}
+
+/// Calls visit(texel, triangle, weights, point on the base, direction) for each texel of a triangle.
+template <class Visit>
+size_t forEachTexel(const Baked& of, const Visit& visit) {
+    const std::vector<uint32_t> owners = *ownersOf(of.map, 0);
+    size_t count = 0;
+    for (size_t texel = 0; texel < owners.size(); ++texel) {
+        if (owners[texel] == kNoTriangle) continue;
+        const dvec2 at(double(texel % size_t(of.map.size)), double(texel / size_t(of.map.size)));
+        const dvec3 w = weightsAt(of.map.places[owners[texel]], at);
+        dvec3 point(0), direction(0);
+        for (int k = 0; k < 3; ++k) {
+            const uint32_t corner = of.base.triangles[owners[texel]][k];
+            point += w[k] * of.base.positions[corner], direction += w[k] * of.directions[corner];
+        }
+        visit(texel, owners[texel], w, point, direction);
+        ++count;
+    }
+    return count;
+}
+
+double valueOf(const BakedHeights& heights, size_t texel) {
+    return heights.offset + heights.range * heights.values[texel] / 65535;
+}
+
+TEST(Bake, ABumpySphereOverACoarseOne) {
+    const test::BuiltMesh scan(bumpySphere(), 1.0 / 32);
+    ASSERT_TRUE(scan.ok());
+    const Baked baked = bakeOver(scan, roundOctahedron(2), 256, 0.2, false);
+    ASSERT_TRUE(baked.maps) << baked.maps.error().line();
+    const BakedMaps& maps = *baked.maps;
+    EXPECT_EQ(maps.shares.height, 1);
+    EXPECT_LT(maps.heights.range, 0.2);
+    const double bound = 1e-4 + 0.5 * maps.heights.range / 65535;
+    double worst = 0, worstOther = 0, worstNormal = 1;
+    const size_t texels = forEachTexel(baked, [&](size_t texel, uint32_t t, dvec3 w, dvec3 point, dvec3 direction) {
+        const dvec3 q = point + valueOf(maps.heights, texel) * direction;
+        worst = std::max(worst, std::abs(glm::length(q) - bumpyRadius(q)));
+        const dvec3 other = point + valueOf(maps.displacement, texel) * glm::normalize(direction);
+        worstOther = std::max(worstOther, std::abs(glm::length(other) - bumpyRadius(other)));
+        // The normal of |p| - r(p), by differences.
+        dvec3 gradient;
+        for (int axis = 0; axis < 3; ++axis) {
+            dvec3 step(0);
+            step[axis] = 1e-5;
+            const auto value = [](dvec3 p) { return glm::length(p) - bumpyRadius(p); };
+            gradient[axis] = value(q + step) - value(q - step);
+        }
+        const dvec3 n = baked.frames.at(t, w) * dvec3(maps.normals[texel]);
+        worstNormal = std::min(worstNormal, glm::dot(glm::normalize(n), glm::normalize(gradient)));
+    });
+    EXPECT_GT(texels, 20'000u);
+    EXPECT_LT(worst, bound);
+    EXPECT_LT(worstOther, bound);
+    // Facets are flat: their edges of 0.016 see the normal turn by up to 3 times that, and a half of it to either side.
+    EXPECT_GT(worstNormal, std::cos(0.035));
+    // Nothing depends on the memory that pages have.
+    BakeMapsOptions tight{.reach = 0.2, .memoryBytes = kBakeBytesPerTexel * 65536 + (16u << 20)};
+    const std::shared_ptr<const ByteReader> reader = *openFile(scan.file());
+    const auto again =
+        bakeMaps(reader, scan.cache().dataset(), baked.base, baked.map, baked.frames, baked.directions, tight);
+    ASSERT_TRUE(again) << again.error().line();
+    EXPECT_EQ(again->heights.values, maps.heights.values);
+    tight.memoryBytes -= 1;
+    const auto less =
+        bakeMaps(reader, scan.cache().dataset(), baked.base, baked.map, baked.frames, baked.directions, tight);
+    ASSERT_FALSE(less);
+    EXPECT_EQ(less.error().code, ErrorCode::Limit);
+    tight.memoryBytes += 1;
+    tight.progress = [](double) { return false; };
+    EXPECT_EQ(bakeMaps(reader, scan.cache().dataset(), baked.base, baked.map, baked.frames, baked.directions, tight)
+                  .error()
+                  .code,
+              ErrorCode::Cancelled);
+}
+
+TEST(Bake, BumpsOverTwoTrianglesToTheStep) {
+    // All places are whole parts of 2^-14, which the lattice keeps.
+    const auto height = [](double x, double y) { return std::round(256 * std::sin(7 * x) * std::cos(5 * y)) / 4096; };
+    const test::BuiltMesh scan(sheet(-0.25, 1.25, 96, height), 1.0 / 16);
+    ASSERT_TRUE(scan.ok());
+    const Baked baked = bakeOver(scan, unitSquare(), 64, 0.25, true);
+    ASSERT_TRUE(baked.maps) << baked.maps.error().line();
+    const BakedMaps& maps = *baked.maps;
+    EXPECT_EQ(maps.shares.height, 1);
+    const double step = maps.heights.range / 65535;
+    for (int y = 0; y < 64; ++y)
+        for (int x = 0; x < 64; ++x) {
+            // Texels are where other programs have them.
+            const dvec3 above((x + 0.5) / 64, (y + 0.5) / 64, 1);
+            const auto hit = scan.bvh().nearestHit(above, {0, 0, -1});
+            ASSERT_TRUE(hit);
+            ASSERT_NEAR(valueOf(maps.heights, size_t(x) + 64 * size_t(y)), 1 - hit->t, 0.5 * step + 1e-7)
+                << x << ", " << y;
+        }
+}
+
+TEST(Bake, WhatIsNoHeightFieldIsCounted) {
+    const auto sharesOf = [](const IndexedMesh& mesh, double reach) {
+        const test::BuiltMesh scan(mesh, 1.0 / 16);
+        EXPECT_TRUE(scan.ok());
+        const Baked baked = bakeOver(scan, unitSquare(), 64, reach, true);
+        EXPECT_TRUE(baked.maps) << baked.maps.error().line();
+        return baked.maps ? baked.maps->shares : BakedShares();
+    };
+    const auto flat = [](double, double) { return 0.03; };
+    // A sheet without a quarter of the square: 32 of its columns, less the texels beside it that it reaches.
+    IndexedMesh quarter = sheet(-0.25, 1.25, 96, flat);
+    std::erase_if(quarter.triangles, [&](const auto& t) {
+        return std::ranges::all_of(t, [&](uint32_t v) { return quarter.positions[v].x >= 0.75; });
+    });
+    const BakedShares missing = sharesOf(quarter, 0.2);
+    EXPECT_NEAR(missing.noHit, 0.25, 1e-12);
+    EXPECT_NEAR(missing.height, 0.75, 1e-12);
+    // A second sheet over a half, within the range of the heights; the nearer is taken.
+    IndexedMesh two = sheet(-0.25, 1.25, 96, [](double x, double) { return x < 0.125 ? 0.1 : 0.03; });
+    IndexedMesh above = sheet(-0.25, 1.25, 96, [](double, double) { return 0.08; });
+    std::erase_if(above.triangles, [&](const auto& t) {
+        return std::ranges::all_of(t, [&](uint32_t v) { return above.positions[v].x <= 0.5; });
+    });
+    test::append(two, above);
+    const BakedShares sheets = sharesOf(two, 0.2);
+    EXPECT_NEAR(sheets.sheets, 0.5, 1e-12);
+    // A slope of 80.5 degrees.
+    const BakedShares steep = sharesOf(sheet(-0.25, 1.25, 96, [](double x, double) { return 6 * (x - 0.5); }), 4);
+    EXPECT_NEAR(steep.steep, 1, 1e-12);
+    // Where nothing is met, that is said.
+    const test::BuiltMesh far(sheet(-0.25, 1.25, 96, [](double, double) { return 3; }), 1.0 / 16);
+    const Baked nothing = bakeOver(far, unitSquare(), 64, 0.5, true);
+    ASSERT_FALSE(nothing.maps);
+    EXPECT_NE(nothing.maps.error().message.find("not one line"), std::string::npos);
+}
+
+TEST(Bake, WhatIsWrittenIsTheScan) {
+    const test::BuiltMesh scan(bumpySphere(), 1.0 / 32);
+    ASSERT_TRUE(scan.ok());
+    const TestFolder folder("vcp_bake_test");
+    const std::filesystem::path to = folder / "asset";
+    std::filesystem::create_directory(to);
+    const std::shared_ptr<const ByteReader> reader = *openFile(scan.file());
+    const auto figures = bake(reader, scan.cache().dataset(), to, {.triangles = 300, .texels = 256, .measured = true});
+    ASSERT_TRUE(figures) << figures.error().line();
+    EXPECT_LE(figures->baseTriangles, 300u);
+    EXPECT_EQ(figures->shares.height, 1);
+    // The surface that a scene draws, from its files: near the formula everywhere, and everywhere there.
+    const auto base = readBaseMesh(to / "base.obj", 1);
+    const auto asset = readAsset(to / "heights.meso");
+    ASSERT_TRUE(base && asset);
+    const auto displaced = displacedMesh(*base, *asset->heights, figures->offset);
+    ASSERT_TRUE(displaced);
+    double worst = 0;
+    for (const dvec3& p : displaced->positions) worst = std::max(worst, std::abs(glm::length(p) - bumpyRadius(p)));
+    // Between its texels, 1/15 of an edge of 0.2, it is straight, as along edges to a triangle with fewer.
+    EXPECT_LT(worst, 6e-4);
+    ASSERT_TRUE(figures->scanToBase && figures->baseToScan);
+    EXPECT_LT(figures->scanToBase->max, 1e-3);
+    EXPECT_LT(figures->baseToScan->max, 1e-3);
+    EXPECT_GT(figures->baseToScan->max, 0);
+}
+
+}  // namespace
+}  // namespace vcp
