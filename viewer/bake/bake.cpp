@@ -1,6 +1,8 @@
 #include "viewer/bake/bake.h"
 
+#include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include <fmt/format.h>
 #include <glm/geometric.hpp>
@@ -124,6 +126,11 @@ private:
         auto made = decimated(surface, {.triangles = options_.triangles, .progress = progress(kDecimating)});
         if (!made) return named(made.error(), reader_->name());
         base_ = *std::move(made);
+        keepDrawable();
+        if (base_.triangles.empty())
+            return Error{.code = ErrorCode::InvalidInput,
+                         .message = "nothing of it is a surface with an outside; give a base of your own",
+                         .file = reader_->name()};
         if (options_.reach > 0) {
             figures_.reach = options_.reach;
             return {};
@@ -134,6 +141,19 @@ private:
                        measureDeviation(scan_.mesh, target, {.samples = kForReach, .progress = progress(kReaching)}));
         figures_.reach = std::max(1.5 * away.absoluteQuantile(1), 4 * dataset_.cellOf(dataset_.header.levels - 1));
         return {};
+    }
+
+    /// Leaves out what no scene draws: triangles on edges that have become one, and at corners whose normals cancel.
+    void keepDrawable() {
+        joinPositions(base_);
+        for (size_t before = 0; before != base_.triangles.size();) {
+            before = base_.triangles.size();
+            figures_.leftOut += keepManifoldPart(base_);
+            const std::vector<glm::dvec3> directions = shellDirections(base_);
+            figures_.leftOut += std::erase_if(base_.triangles, [&](const auto& t) {
+                return std::any_of(t.begin(), t.end(), [&](uint32_t v) { return directions[v] == glm::dvec3(0); });
+            });
+        }
     }
 
     Result<void> readBase() {

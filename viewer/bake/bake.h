@@ -31,7 +31,9 @@ struct BakeOptions {
 
 struct BakeFigures {
     uint64_t scanTriangles = 0, baseTriangles = 0;
-    uint64_t leftOut = 0;  ///< triangles of the scan that share an edge with two others: the base is made without
+    /// Triangles without which a decimated base is made, of the scan or its own: a third one on an edge, or at a corner
+    /// whose normals cancel.
+    uint64_t leftOut = 0;
     bool isAtlas = false;  ///< else the base's own texture coordinates are used
     /// For a decimated base half as much again as the scan is away from it, for another a fiftieth of the diagonal.
     double reach = 0;

@@ -68,8 +68,9 @@ std::string summary(const BakeMeso& command, const BakeFigures& f, uint64_t scan
         formatBytes(scanBytes), formatLength(f.offset), formatLength(f.offset + f.range), formatLength(f.reach),
         100 * f.shares.height, 100 * f.shares.noHit, 100 * f.shares.sheets, 100 * f.shares.steep);
     if (f.leftOut > 0)
-        text += fmt::format("\n  the base is made without {} triangles of the scan, on edges of more than two",
-                            formatCount(f.leftOut));
+        text += fmt::format(
+            "\n  the base is made without {} triangles of the scan, on edges of more than two or without an outside",
+            formatCount(f.leftOut));
     const auto line = [&](const char* what, const Quantiles& q) {
         text +=
             fmt::format("\n  {} p50 {} p95 {} p99 {} max {}, of the diagonal {:.3f} {:.3f} {:.3f} {:.3f} %", what,
