@@ -17,11 +17,11 @@
 namespace vcp {
 
 struct BakeOptions {
-    std::filesystem::path base;  ///< a mesh; empty: the scan's own surface is decimated
-    size_t triangles = 10'000;   ///< of a base that is decimated
-    int texels = 1024;           ///< an edge of the maps
-    bool newMap = false;         ///< texture coordinates of the base are not used
-    double reach = 0;            ///< world units, as BakeMapsOptions; 0: chosen (see BakeFigures)
+    std::filesystem::path base = {};  ///< a mesh; empty: the scan's own surface is decimated
+    size_t triangles = 10'000;        ///< of a base that is decimated
+    int texels = 1024;                ///< an edge of the maps
+    bool newMap = false;              ///< texture coordinates of the base are not used
+    double reach = 0;                 ///< world units, as BakeMapsOptions; 0: chosen (see BakeFigures)
     bool withColour = true;
     bool measured = false;  ///< distances between scan and displaced base; both are held in memory
     uint64_t memoryBytes = uint64_t{4} << 30;
