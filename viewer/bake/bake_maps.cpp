@@ -150,8 +150,7 @@ private:
 
     TexelState stateOf(size_t texel, const LineHit& hit) const {
         if (std::isnan(hit.at)) return TexelState::NoHit;
-        const double low = made_.heights.offset, high = low + made_.heights.range;
-        if (double(hit.other) >= low && double(hit.other) <= high) return TexelState::Sheets;
+        if (std::abs(double(hit.other)) <= 2 * std::abs(hit.at)) return TexelState::Sheets;
         const double steep = std::cos(kSteepDegrees * std::numbers::pi / 180);
         const dvec3 direction = lineOf(texel).direction;
         return glm::dot(dvec3(hit.normal), direction) < steep * glm::length(direction) ? TexelState::Steep

@@ -24,7 +24,7 @@ enum class TexelState : uint8_t {
     Outside,  ///< in no triangle
     Height,   ///< it is
     NoHit,    ///< the line meets nothing
-    Sheets,   ///< the line meets a second sheet within the range of the heights
+    Sheets,   ///< the line meets a second sheet at most twice as far from the base
     Steep,    ///< the surface is turned away from the line by more than kSteepDegrees
 };
 inline constexpr double kSteepDegrees = 78;
