@@ -17,9 +17,9 @@ namespace {
 using glm::dvec2, glm::dvec3, glm::ivec2;
 using Places = std::array<dvec2, 3>;
 
-/// A block of two halves with n steps has n + kAround texels an edge: between the two hypotenuses lie three diagonals,
-/// and a texel around the block.
-constexpr int kAround = 5;
+/// A block of two halves with n steps has n + kAround texels an edge: around the block lies one texel, and between the
+/// two hypotenuses five diagonals, two of which are each one's own.
+constexpr int kAround = 6;
 
 double areaOf(const BaseSurface& surface, size_t triangle) {
     const auto& t = surface.triangles[triangle];

@@ -2,8 +2,8 @@
 // coordinates put them.
 //
 // The atlas: each triangle is a right-angled half of a square, its longest edge the hypotenuse, with 2^k steps of a
-// texel along each edge (k from 1, by its area). Two halves share a block, and around each chart lie two texels that
-// are its own or nobody's, so charts neither overlap nor touch. All edges run from texel to texel, so two triangles
+// texel along each edge (k from 1, by its area). Two halves share a block, and around each chart lies a texel
+// of its own, so charts neither overlap nor touch. All edges run from texel to texel, so two triangles
 // have their common edge in the same steps, or one of them in 2^i times as many: what is written along it can be made
 // the same from both sides (conformEdges), and then surfaces have no cracks there.
 #pragma once

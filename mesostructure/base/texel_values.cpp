@@ -4,6 +4,8 @@
 #include <limits>
 #include <map>
 
+#include <glm/geometric.hpp>
+
 namespace vcp::meso {
 
 namespace {
@@ -52,7 +54,7 @@ public:
     void run() {
         corners();
         edges();
-        for (size_t i = 0; i < surface_.triangles.size(); ++i) beyondHypotenuse(i);
+        for (size_t i = 0; i < surface_.triangles.size(); ++i) goOn(i);
     }
 
 private:
@@ -110,22 +112,29 @@ private:
         }
     }
 
-    /// The hypotenuse runs through the diagonals of cells. Their bilinear values are linear along the diagonal where
-    /// the corner beyond it is the sum of the two ends, less the corner within.
-    void beyondHypotenuse(size_t triangle) {
+    /// Lets the values go on straight beyond the edges: slopes there are those within. The hypotenuse runs through the
+    /// diagonals of cells, whose bilinear values are linear along it where a corner is the sum of its two neighbours
+    /// less the corner opposite.
+    void goOn(size_t triangle) {
         const auto& p = map_.places[triangle];
-        for (int k = 0; k < 3; ++k) {
-            const ivec2 from(p[k]), to(p[(k + 1) % 3]), third(p[(k + 2) % 3]);
-            if (from.x == to.x || from.y == to.y) continue;
-            const int n = map_.steps[triangle];
-            const ivec2 step = (to - from) / n;
-            for (int s = 0; s < n; ++s) {
-                const ivec2 a = from + step * s, b = a + step;
-                const bool isFirstWithin = (third.x == from.x);  // the right angle lies below or beside `from`
-                const ivec2 within = isFirstWithin ? ivec2(a.x, b.y) : ivec2(b.x, a.y), beyond = a + b - within;
-                at(beyond) = at(a) + at(b) - at(within);
-            }
+        int right = 0;
+        for (int k = 0; k < 3; ++k)
+            if (glm::dot(p[(k + 1) % 3] - p[k], p[(k + 2) % 3] - p[k]) == 0) right = k;
+        const int n = map_.steps[triangle];
+        const ivec2 from(p[right]), x = (ivec2(p[(right + 1) % 3]) - from) / n,
+                                    y = (ivec2(p[(right + 2) % 3]) - from) / n;
+        const auto value = [&](int i, int j) -> Value& { return at(from + i * x + j * y); };
+        for (int i = 0; i < n; ++i)
+            value(i + 1, n - i) = value(i, n - i) + value(i + 1, n - i - 1) - value(i, n - i - 1);
+        value(n + 1, 0) = 2.0f * value(n, 0) - value(n - 1, 0);
+        value(0, n + 1) = 2.0f * value(0, n) - value(0, n - 1);
+        for (int i = 0; i <= n; ++i)
+            value(i + 1, n - i + 1) = value(i + 1, n - i) + value(i, n - i + 1) - value(i, n - i);
+        for (int i = 0; i <= n + 1; ++i) {
+            value(i, -1) = 2.0f * value(i, 0) - value(i, 1);
+            value(-1, i) = 2.0f * value(0, i) - value(1, i);
         }
+        value(-1, -1) = value(-1, 0) + value(0, -1) - value(0, 0);
     }
 
     const BaseSurface& surface_;

@@ -30,8 +30,9 @@ void fillMissing(const TexelCharts& of, std::span<float> values);
 void fillMissing(const TexelCharts& of, std::span<glm::vec3> values);
 
 /// Makes values along the edges of an atlas the same from both sides: at corners those of the first triangle that has
-/// one; along an edge those of the triangle with fewer steps, linear between its texels for the other; and beyond a
-/// hypotenuse what makes bilinear values along it linear. Nothing else is changed; nothing at all without an atlas.
+/// one; along an edge those of the triangle with fewer steps, linear between its texels for the other. Beyond the
+/// edges the values go on straight, so that bilinear values along a hypotenuse are linear, too, and slopes at edges are
+/// those within. Nothing else is changed; nothing at all without an atlas.
 void conformEdges(const BaseSurface& surface, const TexelMap& map, std::span<float> values);
 void conformEdges(const BaseSurface& surface, const TexelMap& map, std::span<glm::vec3> values);
 

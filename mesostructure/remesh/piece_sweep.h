@@ -68,7 +68,9 @@ private:
     Real3 normalAt(const Real3& position, const Real3& direction, Real2 uv, Real density, Real height) const {
         if (frame_->turned == 0) return frame_->flat;
         const HeightLevels& heights = *view_.surface.heights;
-        const Real texels = std::max(view_.texelsAt(position, density), Real(1));
+        // A map without coarser levels is that of an atlas: a wider look would go beyond the chart.
+        const Real texels =
+            heights.levels().size() == 1 ? Real(1) : std::max(view_.texelsAt(position, density), Real(1));
         const Real step = texels / Real(heights.levels().front().size.x);
         const Real2 u(Real(0.5) * step, 0), v(0, Real(0.5) * step);
         const Real byU = (heights.height(uv + u, texels) - heights.height(uv - u, texels)) / step,
