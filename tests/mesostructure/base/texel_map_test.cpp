@@ -107,7 +107,7 @@ TEST(TexelMap, ValuesAlongEdgesAreTheSameFromBothSides) {
         SCOPED_TRACE(name);
         BaseSurface surface = shape(name);
         for (dvec3& p : surface.positions) p.z *= p.x > 0 ? 3 : 1;  // charts of different sizes meet
-        const TexelMap map = atlasOf(surface, 512);
+        const TexelMap map = atlasOf(surface, 1024);
         std::vector<float> values = randomValues(map);
         conformEdges(surface, map, std::span(values));
         std::map<std::pair<uint32_t, uint32_t>, std::vector<std::pair<size_t, int>>> edges;

@@ -87,8 +87,9 @@ TEST_F(BakeCommand, AScanBecomesASceneAndPictures) {
     }
     EXPECT_EQ(told["bytes"], bytes);
     // The scene looks as the scan does.
+    const std::string camera = write("camera.json", R"({"position": [0.5, -4, 1], "target": [0, 0, 0]})");
     for (const std::string& of : {path("asset/scene.json"), path("ball.vcp")}) {
-        const Ran drawn = run("render " + of + " --camera 20,10 --size 96x96 --samples 4 --progress none -o " +
+        const Ran drawn = run("render " + of + " --camera " + camera + " --size 96x96 --samples 4 --progress none -o " +
                               path(of.ends_with("json") ? "a.png" : "b.png"));
         ASSERT_EQ(drawn.status, 0) << drawn.err;
     }
@@ -105,7 +106,7 @@ TEST_F(BakeCommand, AScanBecomesASceneAndPictures) {
     const Ran again = run("build " + path("asset/base.glb") + " -o " + path("base.vcp") + " --json");
     ASSERT_EQ(again.status, 0) << again.err;
     EXPECT_EQ(Json::parse(again.out)["triangles"], 200);
-    fs::remove(path("base.vcp")), fs::remove(path("a.png")), fs::remove(path("b.png"));
+    fs::remove(path("base.vcp")), fs::remove(path("a.png")), fs::remove(camera), fs::remove(path("b.png"));
     // What is there stays, unless it is to be replaced and holds nothing else.
     const Ran over = run("meso bake " + path("ball.vcp") + " -o " + path("asset") + " --triangles 100 --texels 64");
     EXPECT_EQ(over.status, 2);

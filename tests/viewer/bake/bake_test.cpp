@@ -285,7 +285,7 @@ TEST(Bake, WhatIsWrittenIsTheScan) {
     const std::filesystem::path to = folder / "asset";
     std::filesystem::create_directory(to);
     const std::shared_ptr<const ByteReader> reader = *openFile(scan.file());
-    const auto figures = bake(reader, scan.cache().dataset(), to, {.triangles = 300, .texels = 256, .measured = true});
+    const auto figures = bake(reader, scan.cache().dataset(), to, {.triangles = 300, .texels = 384, .measured = true});
     ASSERT_TRUE(figures) << figures.error().line();
     EXPECT_LE(figures->baseTriangles, 300u);
     EXPECT_EQ(figures->shares.height, 1);
@@ -296,7 +296,7 @@ TEST(Bake, WhatIsWrittenIsTheScan) {
     const auto displaced = displacedMesh(*base, *asset->heights, figures->offset);
     ASSERT_TRUE(displaced);
     // Between its texels it is straight, along two axes.
-    const double step = 1.1 * longestStep(*base, *makeAtlas(*base, 256));
+    const double step = 1.1 * longestStep(*base, *makeAtlas(*base, 384));
     const double bound = facetsOff(sphere) + 2 * kMostCurvature / 8 * step * step;
     EXPECT_LT(bound, 4e-3);
     double worst = 0;
