@@ -94,8 +94,8 @@ async function draw(view, update, sample) {
         if (shows) pixels.set(done.pixels, 4 * width * first * rows);
     };
     const castHere = ({ first, count }) => put(first, module.castBands(view, rows, first, count, shows));
-    const asked = plan.jobs.map(({ caster, part }) =>
-        caster.cast(module, { view, sample, begun, shows }, sample === 0 ? part : caster.fit(module, rows, part)));
+    // The pages of a part are those of its first sample, as the cut is.
+    const asked = plan.jobs.map(({ caster, part }) => caster.cast(module, { view, sample, begun, shows }, part));
     plan.own.forEach(castHere);
     const answers = await Promise.all(asked), kept = [];
     answers.forEach((done, i) => {
