@@ -21,12 +21,6 @@ using Places = std::array<dvec2, 3>;
 /// two hypotenuses five diagonals, two of which are each one's own.
 constexpr int kAround = 6;
 
-double areaOf(const BaseSurface& surface, size_t triangle) {
-    const auto& t = surface.triangles[triangle];
-    const dvec3 a = surface.positions[t[0]];
-    return 0.5 * glm::length(glm::cross(surface.positions[t[1]] - a, surface.positions[t[2]] - a));
-}
-
 double twiceAreaOf(const Places& p) {
     const dvec2 a = p[1] - p[0], b = p[2] - p[0];
     return a.x * b.y - a.y * b.x;
@@ -127,6 +121,12 @@ Error wrong(size_t triangle, std::string message) {
 }
 
 }  // namespace
+
+double areaOf(const BaseSurface& surface, size_t triangle) {
+    const auto& t = surface.triangles[triangle];
+    const dvec3 a = surface.positions[t[0]];
+    return 0.5 * glm::length(glm::cross(surface.positions[t[1]] - a, surface.positions[t[2]] - a));
+}
 
 std::vector<Places> TexelMap::tileUvs() const {
     std::vector<Places> uvs = places;

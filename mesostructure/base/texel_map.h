@@ -34,6 +34,9 @@ struct TexelMap {
     [[nodiscard]] glm::ivec2 onEdge(size_t triangle, int k, int s) const;
 };
 
+/// Returns the area of a triangle in the world.
+double areaOf(const BaseSurface& surface, size_t triangle);
+
 inline constexpr int kLeastChartSteps = 2, kMostChartSteps = 1024;
 
 /// Makes an atlas of all triangles. `size`: texels an edge, 8 to kMaxGridEdge. Errors: Limit (the charts do not fit

@@ -13,6 +13,7 @@
 #include "mesostructure/base/texel_values.h"
 #include "octree/surface/morton.h"
 #include "viewer/bake/line_sampler.h"
+#include "viewer/camera/orbit_camera.h"
 
 namespace vcp {
 
@@ -66,14 +67,13 @@ private:
     /// Chooses the texels that are sampled, in an order that keeps together what lies together. The texels about the
     /// charts of an atlas are not: they get what is next to them.
     void order() {
-        dvec3 low(std::numeric_limits<double>::infinity()), high = -low;
-        for (const dvec3& p : base_.positions) low = glm::min(low, p), high = glm::max(high, p);
-        const dvec3 size = high - low;
+        const Box bounds = Box::of(base_.positions);
+        const dvec3 size = bounds.high - bounds.low;
         const double scale = 1023.0 / std::max({size.x, size.y, size.z, std::numeric_limits<double>::min()});
         std::vector<uint64_t> keys;
         for (size_t texel = 0; texel < owners_.size(); ++texel) {
             if (owners_[texel] == kNoTriangle || (map_.isAtlas() && !isInside(texel))) continue;
-            const glm::uvec3 at(glm::clamp((lineOf(texel).start - low) * scale, 0.0, 1023.0));
+            const glm::uvec3 at(glm::clamp((lineOf(texel).start - bounds.low) * scale, 0.0, 1023.0));
             keys.push_back(uint64_t{mortonEncode(at)} << 32 | texel);
         }
         std::sort(keys.begin(), keys.end());
@@ -169,10 +169,7 @@ private:
             if (!isInside(texel)) continue;
             const TexelState state = stateOf(texel, hits_[i]);
             made_.states[texel] = state;
-            const auto& t = base_.triangles[owners_[texel]];
-            const dvec3 a = base_.positions[t[0]];
-            areas[size_t(state)] += glm::length(glm::cross(base_.positions[t[1]] - a, base_.positions[t[2]] - a)) /
-                                    double(counts[owners_[texel]]);
+            areas[size_t(state)] += areaOf(base_, owners_[texel]) / double(counts[owners_[texel]]);
         }
         const double all = areas[1] + areas[2] + areas[3] + areas[4];
         const auto part = [&](TexelState state) { return all > 0 ? areas[size_t(state)] / all : 0; };

@@ -5,6 +5,9 @@
 #include <glm/common.hpp>
 #include <nlohmann/json.hpp>
 
+#include "viewer/camera/orbit_camera.h"
+#include "viewer/export/glb_chunks.h"
+
 namespace vcp {
 
 namespace {
@@ -14,12 +17,6 @@ using glm::dvec2, glm::dvec3, glm::vec3;
 
 constexpr int kFloat = 5126, kWhole = 5125, kVertices = 34962, kIndices = 34963, kLinear = 9729, kTrilinear = 9987,
               kClamped = 33071;
-
-/// Appends a number as its bytes, little endian like the processor's.
-template <class Number>
-void put(std::string& bytes, Number number) {
-    bytes.append(reinterpret_cast<const char*>(&number), sizeof number);
-}
 
 /// The binary chunk and what describes it.
 struct Buffer {
@@ -86,9 +83,7 @@ Json materialOf(bool hasColour) {
 
 Result<std::string> glbOf(const std::string& name, const meso::BaseSurface& base, const BaseFrames& frames,
                           const BakedMaps& maps) {
-    dvec3 low(std::numeric_limits<double>::infinity()), high = -low;
-    for (const dvec3& p : base.positions) low = glm::min(low, p), high = glm::max(high, p);
-    const dvec3 origin = glm::round(0.5 * (low + high));
+    const dvec3 origin = glm::round(Box::of(base.positions).centre());
     const Buffer buffer = bufferOf(base, frames, maps.size, origin);
     const bool hasColour = !maps.light.empty();
     Json images = {{{"uri", "normal.png"}}}, textures = {{{"source", 0}, {"sampler", 0}}};
@@ -118,18 +113,11 @@ Result<std::string> glbOf(const std::string& name, const meso::BaseSurface& base
         {"buffers", {{{"byteLength", buffer.bytes.size()}}}}};
     std::string text = json.dump(-1, ' ', false, Json::error_handler_t::replace);
     text.resize((text.size() + 3) / 4 * 4, ' ');
-    const uint64_t bytes = 12 + 8 + text.size() + 8 + buffer.bytes.size();
+    const uint64_t bytes = kGlbFrameBytes + text.size() + buffer.bytes.size();
     if (bytes > std::numeric_limits<uint32_t>::max())
         return Error{.code = ErrorCode::Limit,
                      .message = "a GLB has at most 2^32 bytes; fewer triangles make a smaller one"};
-    std::string made = "glTF";
-    put(made, uint32_t{2});
-    put(made, uint32_t(bytes));
-    put(made, uint32_t(text.size()));
-    made += "JSON" + text;
-    put(made, uint32_t(buffer.bytes.size()));
-    made += std::string("BIN\0", 4) + buffer.bytes;
-    return made;
+    return glbStart(text, buffer.bytes.size()) + buffer.bytes;
 }
 
 }  // namespace vcp

@@ -15,6 +15,7 @@
 #include <filesystem>
 #include <limits>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 
@@ -40,6 +41,12 @@ struct Box {
     static Box nothing() {
         return {glm::dvec3(std::numeric_limits<double>::infinity()),
                 glm::dvec3(-std::numeric_limits<double>::infinity())};
+    }
+    /// The box about points.
+    static Box of(std::span<const glm::dvec3> points) {
+        Box box = nothing();
+        for (const glm::dvec3& p : points) box = box.joined({p, p});
+        return box;
     }
     [[nodiscard]] Box joined(const Box& other) const { return {glm::min(low, other.low), glm::max(high, other.high)}; }
 };

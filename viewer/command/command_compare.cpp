@@ -51,7 +51,7 @@ public:
         VCP_TRY(checkOutputs());
         VCP_TRY(load(command_.inputs[0], a_, {"reading the first", 0, 0.1}));
         VCP_TRY(load(command_.inputs[1], b_, {"reading the second", 0.1, 0.2}));
-        const Box bounds = boundsOf(a_.mesh);
+        const Box bounds = Box::of(a_.mesh.positions);
         diagonal_ = glm::distance(bounds.low, bounds.high);
         within_ = command_.within ? lengthOf(*command_.within) : within_;
         display_.update("sorting the second", 0.2);
@@ -83,12 +83,6 @@ private:
             display_.update(stage.name, stage.from + (stage.to - stage.from) * fraction);
             return !interrupted();
         };
-    }
-
-    static Box boundsOf(const IndexedMesh& mesh) {
-        Box bounds = Box::nothing();
-        for (const glm::dvec3& p : mesh.positions) bounds = {glm::min(bounds.low, p), glm::max(bounds.high, p)};
-        return bounds;
     }
 
     [[nodiscard]] OutputRules rules() const {
@@ -124,7 +118,7 @@ private:
         VCP_TRY_ASSIGN(const auto dataset, readDataset(*reader));
         uint32_t level = dataset.header.levels - 1;
         if (command_.error) {
-            const Box bounds = vcp::boundsOf(dataset.header);
+            const Box bounds = boundsOf(dataset.header);
             const double scale = command_.error->isRelative ? glm::distance(bounds.low, bounds.high) : 1;
             VCP_TRY_ASSIGN(level, coarsestLevelWithin(command_.error->value * scale, dataset, input));
         }

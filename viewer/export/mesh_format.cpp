@@ -12,6 +12,7 @@
 #include <nlohmann/json.hpp>
 
 #include "builder/stream/colour_encoding.h"
+#include "viewer/export/glb_chunks.h"
 
 namespace vcp {
 
@@ -21,12 +22,6 @@ using Json = nlohmann::ordered_json;
 
 constexpr size_t kTextHeaderBytes = 1024, kGlbHeaderBytes = 4096;
 constexpr size_t kLongestNote = 200;
-
-/// Appends a number as its bytes, little endian like the processor's.
-template <class Number>
-void put(std::string& bytes, Number number) {
-    bytes.append(reinterpret_cast<const char*>(&number), sizeof number);
-}
 
 uint8_t channelOf(uint32_t rgba, int channel) { return uint8_t(rgba >> 8 * channel); }
 
@@ -152,14 +147,8 @@ public:
     [[nodiscard]] std::string header(uint64_t vertices, uint64_t triangles, const Notes& notes) const override {
         const uint64_t data = dataBytes(vertices, triangles);
         std::string json = jsonOf(vertices, triangles, notes).dump(-1, ' ', false, Json::error_handler_t::replace);
-        json.resize(kGlbHeaderBytes - 28, ' ');
-        std::string bytes = "glTF";
-        put(bytes, uint32_t{2});
-        put(bytes, uint32_t(kGlbHeaderBytes + data));
-        put(bytes, uint32_t(json.size()));
-        bytes += "JSON" + json;
-        put(bytes, uint32_t(data));
-        return bytes + std::string("BIN\0", 4);
+        json.resize(kGlbHeaderBytes - kGlbFrameBytes, ' ');
+        return glbStart(json, data);
     }
     void add(const SurfaceVertex& vertex, std::string& bytes) override {
         const glm::vec3 p(vertex.at - options_.positions.origin);

@@ -56,8 +56,7 @@ Result<LoadedSurface> loadSurface(const ByteReader& reader, const SurfaceCut& cu
 
 Result<void> writeDistances(const IndexedMesh& mesh, std::span<const float> distances, double range,
                             const std::filesystem::path& output, const OutputRules& rules, const Notes& notes) {
-    Box bounds = Box::nothing();
-    for (const glm::dvec3& p : mesh.positions) bounds = {glm::min(bounds.low, p), glm::max(bounds.high, p)};
+    const Box bounds = Box::of(mesh.positions);
     constexpr double kSteps = 1 << 22;
     const PositionFormat positions =
         positionsFor(OutputKind::Ply, bounds, glm::distance(bounds.low, bounds.high) / kSteps);

@@ -161,9 +161,7 @@ Result<std::shared_ptr<const Comparison::Measured>> Comparison::measure(const Su
     VCP_TRY_ASSIGN(auto first, load(a, access, {0, 0.1}));
     VCP_TRY_ASSIGN(const auto second, load(b, access, {0.1, 0.2}));
     measured->mesh = std::move(first.mesh);
-    Box bounds = Box::nothing();
-    for (const glm::dvec3& p : measured->mesh.positions) bounds = {glm::min(bounds.low, p), glm::max(bounds.high, p)};
-    measured->diagonal = glm::distance(bounds.low, bounds.high);
+    measured->diagonal = Box::of(measured->mesh.positions).diagonal();
     const DeviationTarget target(second.mesh);
     VCP_TRY_ASSIGN(measured->deviation, measureDeviation(measured->mesh, target, {.progress = progress({0.3, 0.4})}));
     // Colours are of vertices, so the large triangles of a drawing need more of them; figures do not.
