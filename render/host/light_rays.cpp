@@ -1,6 +1,9 @@
 // castLightRays, compiled for several instruction sets, as castTile is (tile_caster.cpp).
 #include "render/host/light_rays.h"
 
+#include <array>
+#include <vector>
+
 #include "render/host/instruction_sets.h"
 
 #undef HWY_TARGET_INCLUDE
@@ -8,17 +11,18 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
-#include "render/host/ray_caster-inl.h"
+#include "render/host/ray_stream-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace vcp::HWY_NAMESPACE {
 
 void castLightRaysHere(const HostScene& scene, std::span<const LightRay> rays, float* distances, PageMarks* marks) {
-    RayCaster caster(scene, marks);
-    for (const LightRay& ray : rays) {
-        caster.begin(ray.origin, ray.direction, ray.reach);
-        *distances++ = caster.next(0);
-    }
+    std::array<std::vector<uint32_t>, 8> streams;
+    for (size_t i = 0; i < rays.size(); ++i)
+        streams[SingleRay(rays[i].origin, rays[i].direction).nearest].push_back(uint32_t(i));
+    RayStream stream(scene, marks);
+    for (const std::vector<uint32_t>& some : streams)
+        if (!some.empty()) stream.cast(rays, some, distances);
 }
 
 }  // namespace vcp::HWY_NAMESPACE

@@ -7,6 +7,7 @@
 
 #include "viewer/bench/bench_build.h"
 #include "viewer/bench/bench_meso.h"
+#include "viewer/bench/frames/bench_frames.h"
 #include "viewer/bench/rays/bench_methods.h"
 #include "viewer/bench/rays/bench_rays.h"
 #include "viewer/bench/stress/bench_stream.h"
@@ -35,7 +36,7 @@ struct RaysCommand : BenchCommand {
     std::string device;
     int views = 1;
     int judgeEvery = 1;
-    bool sweep = false, stability = false;
+    bool sweep = false, stability = false, frames = false;
     PaperOptions paper;
 };
 
@@ -95,8 +96,20 @@ Result<int> runBuild(const BuildBenchCommand& command) {
     return report.failures.front();
 }
 
+Result<int> runFrames(const RaysCommand& command) {
+    if (command.models.empty())
+        return Error{.code = ErrorCode::Usage, .message = "which models? name meshes, or .vcp files beside theirs"};
+    BenchFramesOptions options;
+    takeShared(command, options);
+    if (!command.cameras.empty()) options.cameras = command.cameras;
+    options.size = command.size;
+    VCP_TRY_ASSIGN(const auto rows, runShown(command, benchFrames, options, options.progress));
+    return publish(command, "bench_frames", {benchFramesJson(rows), benchFramesCsv(rows), benchFramesMarkdown(rows)});
+}
+
 Result<int> runRays(const RaysCommand& command) {
     VCP_TRY(makeFolder(command.out));
+    if (command.frames) return runFrames(command);
     BenchRaysOptions options;
     takeShared(command, options);
     options.methods = command.methods;
@@ -189,6 +202,8 @@ RunCommand addBenchRays(CLI::App& bench) {
     app->add_flag("--stability", command->stability,
                   "Also what single precision costs, on the processor and on the device, with cells from 1e-6 to 1e6 "
                   "and origins to 1e7 cells");
+    app->add_flag("--frames", command->frames,
+                  "Instead, whole frames of the host beside Embree's: hits alone, light, shadows, 8 occlusion rays");
     app->add_option("--cameras", command->cameras,
                     "whole, half, close, cells [these four]; lattice and grazing, which look for holes")
         ->type_name("A,B")

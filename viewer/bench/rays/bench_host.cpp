@@ -8,7 +8,9 @@
 #include "builder/measure/quantile.h"
 #include "render/frame_setup.h"
 #include "render/host/host_caster.h"
+#include "render/host/slab_blend.h"
 #include "viewer/bench/rays/bench_tracer.h"
+#include "viewer/bench/rays/drawn_cut.h"
 
 namespace vcp {
 
@@ -32,14 +34,25 @@ public:
     [[nodiscard]] uint64_t bytes() const override { return bytes_; }
 
     Result<TracedPicture> trace(const Camera& camera, glm::ivec2 size, int repetitions) override {
-        VCP_TRY_ASSIGN(const auto scene, sceneFor(camera, size));
-        const PictureRays rays = pictureRays(camera, uint32_t(size.x), uint32_t(size.y));
+        FrameRequest request;
+        request.camera = camera;
+        request.width = uint32_t(size.x);
+        request.height = uint32_t(size.y);
+        request.errorPixels = errorPixels_;
+        VCP_TRY_ASSIGN(const auto scene, sceneFor(request));
+        const PictureRays rays = pictureRays(request);
+        const auto frame = frameConstants(request, &cache_.dataset(), 1, false, errorPixels_);
         std::vector<HostPixel> pixels(size_t(size.x) * size.y);
         std::vector<double> seconds;
         for (int repetition = 0; repetition <= repetitions; ++repetition) {
             const auto start = Clock::now();
-            VCP_TRY(castPicture(scene, rays, {.threads = threads_},
-                                [&](const TileHits& hits) { take(rays, hits, pixels); }));
+            VCP_TRY(forEachTile(size, {.threads = threads_}, [&](glm::ivec2 corner) {
+                TileHits hits;
+                hits.corner = corner;
+                castTile(scene, rays, hits);
+                blendSlabs(scene, {frame.pixelEdge, frame.pixelEdgePerDepth}, hits);
+                take(rays, hits, pixels);
+            }));
             if (repetition > 0) seconds.push_back(std::chrono::duration<double>(Clock::now() - start).count());
         }
         TracedPicture picture;
@@ -57,21 +70,11 @@ public:
     }
 
 private:
-    Result<HostScene> sceneFor(const Camera& camera, glm::ivec2 size) {
-        FrameRequest request;
-        request.camera = camera;
-        request.width = uint32_t(size.x);
-        request.height = uint32_t(size.y);
-        request.errorPixels = errorPixels_;
-        const Dataset& dataset = cache_.dataset();
-        const std::vector<uint64_t> ones(dataset.pages.size(), 1);
-        const std::vector<uint8_t> all(ones.size(), 1), available(ones.size(), kAvailable);
-        const Selection selection =
-            selectPages(dataset, selectionView(request), std::numeric_limits<uint64_t>::max(), ones, all, available);
-        VCP_TRY(cache_.load(selection.cut));
+    Result<HostScene> sceneFor(const FrameRequest& request) {
+        VCP_TRY_ASSIGN(const auto cut, loadDrawnCut(cache_, request));
         bytes_ = 0;
-        for (const uint64_t page : selection.cut) bytes_ += dataset.pages[page].pageBytes;
-        return HostScene::create(cache_, selection.cut);
+        for (const uint64_t page : cut) bytes_ += cache_.dataset().pages[page].pageBytes;
+        return HostScene::create(cache_, cut);
     }
 
     static void take(const PictureRays& rays, const TileHits& hits, std::vector<HostPixel>& pixels) {
