@@ -2,14 +2,13 @@
 #include "render/host/host_caster.h"
 
 #include <cmath>
-#include <set>
 
 #include <gtest/gtest.h>
-#include <hwy/targets.h>
 
 #include "render/camera.h"
 #include "render/host/hit_surface.h"
 #include "tests/support/built_mesh.h"
+#include "tests/support/instruction_sets.h"
 #include "tests/support/reference_comparison.h"
 #include "tests/support/test_scene.h"
 
@@ -161,19 +160,6 @@ void expectSame(const PageCache& cache, const std::vector<uint64_t>& cut, glm::d
     EXPECT_GT(hits, 10000u);
 }
 
-/// Runs a test once for each instruction set that the processor has and the caster is compiled for.
-template <class Test>
-void onEveryInstructionSet(const Test& test) {
-    std::set<std::string> done;
-    for (int64_t sets = hwy::SupportedTargets(); sets != 0; sets &= sets - 1) {
-        hwy::SetSupportedTargetsForTest(sets & -sets);
-        if (!done.insert(hostInstructionSet()).second) continue;
-        SCOPED_TRACE(hostInstructionSet());
-        test();
-    }
-    hwy::SetSupportedTargetsForTest(0);
-}
-
 void expectSame(const test::Scene& scene, uint32_t level) {
     expectSame(*scene.cache, cutAtLevel(scene.cache->dataset(), level), scene.boxMin, scene.boxMax);
 }
@@ -198,7 +184,7 @@ TEST(HostCaster, SoftLeavesOnEveryAxisAndLevel) {
 }
 
 TEST(HostCaster, EveryInstructionSet) {
-    onEveryInstructionSet([] {
+    test::onEveryInstructionSet([] {
         expectSame(test::torusScene(), 2);
         expectSame(test::wavesScene(12, 3), 0);
     });
@@ -244,7 +230,7 @@ TEST(HostCaster, SectionsOfEveryKindOfLeaf) {
     for (const auto& sections : cutsThrough(scene.boxMin, scene.boxMax)) castTorus(sections);
     for (const auto& sections : cutsThrough(kLow, kHigh))
         for (const uint32_t level : {0u, 99u}) castBuilt(sections, level);
-    onEveryInstructionSet([&] {
+    test::onEveryInstructionSet([&] {
         castTorus(cutsThrough(scene.boxMin, scene.boxMax)[2]);
         castBuilt(cutsThrough(kLow, kHigh)[2], 0);
         castBuilt(cutsThrough(kLow, kHigh)[2], 99);

@@ -39,7 +39,7 @@ struct BenchFramesRow {
     std::string frame;  ///< "trace": hits alone; "light"; "shadows"; "occlusion": 8 rays a pixel, without shadows
     uint64_t rays = 0, lightRays = 0;  ///< from the eye; of light, as many as hits ask for
     uint64_t hits = 0, otherHits = 0;  ///< pixels that the host hits, and that one side alone does
-    FrameCost host, embree;
+    FrameCost host{}, embree{};
     /// Mean difference of the two pictures' light where both hit, of 255; 0 for "trace".
     double differenceMean = 0;
 

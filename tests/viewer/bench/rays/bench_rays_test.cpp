@@ -121,6 +121,38 @@ TEST_F(BenchRays, ASweepHasARowForEachValueAndPlots) {
     EXPECT_NE(markdown.find("| here: ball | 1.00 | 1.00 |"), std::string::npos) << markdown;
 }
 
+TEST_F(BenchRays, FramesBesideEmbreesShowTheSame) {
+    if (!benchHasEmbree()) GTEST_SKIP() << "this build has no Embree";
+    const std::string out = (folder_ / "frames").string();
+    const Ran ran =
+        run(ball_ + " --frames --cameras whole,close --repetitions 1 --size 160x100 --cell 0.1 --json --out " + out);
+    ASSERT_EQ(ran.status, 0) << ran.err;
+    const Json rows = Json::parse(ran.out)["rows"];
+    ASSERT_EQ(rows.size(), 8u);
+    const char* const kFrames[] = {"trace", "light", "shadows", "occlusion"};
+    for (size_t i = 0; i < rows.size(); ++i) {
+        const Json& row = rows[i];
+        SCOPED_TRACE(row.dump());
+        EXPECT_EQ(row["frame"], kFrames[i % 4]);
+        EXPECT_EQ(row["camera"], i < 4 ? "whole" : "close");
+        EXPECT_EQ(row["rays"], 160 * 100);
+        const uint64_t hits = row["hits"], lightRays = row["light_rays"];
+        EXPECT_GT(hits, 3000u);
+        EXPECT_LE(row["other_hits"], hits / 200);
+        EXPECT_LT(row["difference_mean"], 0.5);
+        if (i % 4 < 2) EXPECT_EQ(lightRays, 0u);
+        if (i % 4 == 2) EXPECT_TRUE(lightRays > hits / 4 && lightRays <= hits) << lightRays;
+        if (i % 4 == 3) EXPECT_EQ(lightRays, 8 * hits);
+        for (const char* field :
+             {"wall_ms", "cpu_ms", "embree_wall_ms", "embree_cpu_ms", "ratio_to_embree", "cpu_ratio_to_embree"})
+            EXPECT_GT(row[field], 0) << field;
+    }
+    for (const char* file : {"bench_frames.json", "bench_frames.csv", "bench_frames.md"})
+        EXPECT_TRUE(fs::exists(fs::path(out) / file)) << file;
+    EXPECT_EQ(run("--frames").status, 2);
+    EXPECT_EQ(run(ball_ + " --frames --cameras nowhere").status, 2);
+}
+
 TEST_F(BenchRays, ThePapersRulesAreOptions) {
     const auto row = [&](const std::string& options) {
         const Ran ran = run(ball_ + " --cameras whole --methods paper " + options + kQuick);
