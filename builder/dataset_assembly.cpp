@@ -53,14 +53,14 @@ void linkChildren(std::deque<PageSpool>& levels) {
     }
 }
 
-/// Tells of each page what parts the pages below it have.
+/// Tells of pages that only lead to finer ones what parts those have.
 void foldParts(std::deque<PageSpool>& levels) {
     for (size_t level = levels.size() - 1; level > 0; --level) {
         std::vector<PageEntry>& parents = levels[level - 1].entries();
         auto parent = parents.begin();
         for (const PageEntry& page : levels[level].entries()) {
             while (parent->morton != page.morton >> 3) ++parent;
-            parent->parts |= page.parts;
+            if (parent->leaves == 0) parent->parts |= page.parts & (kPageHasClosed | kPageHasOpen);
         }
     }
 }

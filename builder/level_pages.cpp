@@ -27,21 +27,11 @@ EncodedPage buildGeometry(const LevelSettings& settings, const LatticeMesh& mesh
     return encodePage(tree, mesh);
 }
 
-/// Returns the kinds of parts that triangles belong to (PageEntry).
-uint8_t kindsOf(const LatticeMesh& mesh, std::span<const uint32_t> triangles) {
-    if (mesh.parts.empty()) return kPageHasClosed;
-    uint8_t kinds = 0;
-    for (const uint32_t k : triangles)
-        kinds |= mesh.parts[mesh.triangles[k][0]] == kOpenPart ? kPageHasOpen : kPageHasClosed;
-    return kinds;
-}
-
 /// Builds a page as it is stored; all else that this takes is freed at the end.
 Result<BuiltPage> storedPage(const LevelSettings& settings, const LatticeMesh& mesh, uint64_t code,
                              std::span<const uint32_t> triangles) {
     const EncodedPage encoded = buildGeometry(settings, mesh, code, triangles);
     auto page = builtPage(settings, code, encoded);
-    if (page && settings.finest) page->entry.parts = kindsOf(mesh, triangles);
     if (page) return page;
     return Error{.code = ErrorCode::Limit,
                  .message = fmt::format(
@@ -104,6 +94,7 @@ Result<BuiltPage> builtPage(const LevelSettings& settings, uint64_t code, const 
     page.entry.leaves = encoded.leaves;
     page.entry.slabLeaves = encoded.slabLeaves;
     page.entry.hardLeaves = encoded.hardLeaves;
+    page.entry.parts = encoded.parts;
     page.entry.certifiedError =
         std::nextafter(float(encoded.certifiedError * settings.cell), std::numeric_limits<float>::infinity());
     if (encoded.leaves > 0) {

@@ -15,6 +15,11 @@ namespace {
 // A page is built from at most a few 10^5 leaves; anything above this is a lie.
 constexpr uint64_t kMaxPageBytes = uint64_t{1} << 28;
 
+uint8_t mostPartsOf(uint32_t flags) {
+    const uint8_t both = kPageHasClosed | kPageHasOpen;
+    return (flags & kFlagParts) == 0 ? uint8_t{0} : (flags & kFlagMarks) == 0 ? both : uint8_t(both | kPageHasMarks);
+}
+
 }  // namespace
 
 Error brokenEntry(const std::string& file, uint64_t index, std::string message, uint64_t field) {
@@ -26,7 +31,7 @@ EntryCheck::EntryCheck(const std::string& file, const Dataset& dataset)
     : file_(file),
       header_(dataset.header),
       hasColour_(dataset.hasColour()),
-      mostParts_((dataset.header.flags & kFlagParts) != 0 ? uint8_t(kPageHasClosed | kPageHasOpen) : uint8_t{0}),
+      mostParts_(mostPartsOf(dataset.header.flags)),
       end_(blockOffset(blocksOf(dataset.header.pages))) {}
 
 Result<void> EntryCheck::check(uint64_t index, const PageEntry& e, uint32_t level) {
@@ -48,7 +53,9 @@ Result<void> EntryCheck::check(uint64_t index, const PageEntry& e, uint32_t leve
     if (e.childMask == 0 && e.firstChild != 0)
         return fail(offsetof(PageEntry, firstChild), "wrong child pages: a first one where there are none");
     if (e.reserved != 0) return fail(offsetof(PageEntry, reserved), "reserved bytes must be zero");
-    if (e.parts > mostParts_) return fail(offsetof(PageEntry, parts), "kinds of parts out of range");
+    const bool isMarked = e.parts > (kPageHasClosed | kPageHasOpen);
+    if (e.parts > mostParts_ || (isMarked && e.parts != mostParts_))
+        return fail(offsetof(PageEntry, parts), "kinds of parts out of range");
     if (e.parts == 0 && mostParts_ != 0 && e.leaves != 0)
         return fail(offsetof(PageEntry, parts), "kinds of parts are missing");
     if (level == 0 && e.morton != 0) return fail(offsetof(PageEntry, morton), "the root is not at the origin");

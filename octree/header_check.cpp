@@ -49,8 +49,8 @@ private:
         if (!isKnownVersion(h_.version))
             return fail(8,
                         fmt::format("file version {} is not known; this program reads versions {} to {}: {}",
-                                    h_.version, kOldestFileVersion, kFileVersion,
-                                    h_.version < kFileVersion ? "build it again" : "use a newer program"),
+                                    h_.version, kOldestFileVersion, kNewestFileVersion,
+                                    h_.version < kNewestFileVersion ? "build it again" : "use a newer program"),
                         ErrorCode::Unsupported);
         std::vector<std::byte> unhashed(bytes_.begin(), bytes_.end());
         std::memset(unhashed.data() + offsetof(FileHeader, hash), 0, 8);
@@ -72,7 +72,8 @@ private:
         if (isPaper_ && (h_.levels != 1 || h_.pages != 1 || h_.flags != 0))
             return fail(128, "a file of this method has one page");
         const uint32_t unknown =
-            h_.flags & ~(kFlagColour | (h_.version > 3 ? kFlagCovering : 0) | (h_.version > 5 ? kFlagParts : 0));
+            h_.flags & ~(kFlagColour | (h_.version > 3 ? kFlagCovering : 0) | (h_.version > 5 ? kFlagParts : 0) |
+                         (h_.version >= kMarkedFileVersion ? kFlagMarks : 0));
         if (unknown != 0)
             return fail(offsetof(FileHeader, flags),
                         fmt::format("flags {:#x} are not known to this program: use a newer program", unknown),

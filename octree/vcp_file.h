@@ -1,5 +1,6 @@
-// The .vcp file, version 6. Files of versions 3 to 5 are read, too: they say nothing of parts; those of versions 3 and
-// 4 have all pages without children on the finest level; those of version 3 have no slab leaves and no kFlagCovering.
+// The .vcp file, version 6, or 7 where pages have open marks. Files of versions 3 to 5 are read, too: they say nothing
+// of parts; those of versions 3 and 4 have all pages without children on the finest level; those of version 3 have no
+// slab leaves and no kFlagCovering.
 //
 // Pages without children hold the finest surface. Most are of the finest level; where triangles are few, they are of
 // coarser ones.
@@ -30,8 +31,9 @@
 namespace vcp {
 
 inline constexpr uint32_t kFileVersion = 6;
-inline constexpr uint32_t kOldestFileVersion = 3;  ///< that is read
-inline constexpr uint32_t kMaxLevels = 22;         ///< Morton codes have 21 bits an axis
+inline constexpr uint32_t kMarkedFileVersion = 7;                          ///< with kFlagMarks
+inline constexpr uint32_t kOldestFileVersion = 3, kNewestFileVersion = 7;  ///< that are read
+inline constexpr uint32_t kMaxLevels = 22;                                 ///< Morton codes have 21 bits an axis
 inline constexpr uint32_t kMaxPaperLog2Cells = 20;
 inline constexpr uint64_t kDirectoryOffset = 4096;
 inline constexpr uint64_t kBlockBytes = 4096;
@@ -72,7 +74,7 @@ struct FileHeader {
     uint32_t levels = 0;  ///< 1 to kMaxLevels
     uint32_t log2Cells =
         0;               ///< cells an edge of a page: 2^log2Cells; 1 to 7, of the method Paper to kMaxPaperLog2Cells
-    uint32_t flags = 0;  ///< kFlagColour, kFlagCovering, kFlagParts
+    uint32_t flags = 0;  ///< kFlagColour, kFlagCovering, kFlagParts, kFlagMarks
     Method method = Method::Certified;
     uint64_t triangles = 0, degenerateTriangles = 0, vertices = 0;
     uint64_t leaves = 0;      ///< soft, slab and hard leaves of the pages without children
@@ -92,11 +94,16 @@ inline constexpr uint32_t kFlagCovering = 2;
 /// The header counts the mesh's parts, and entries say of which kinds those in a page are.
 inline constexpr uint32_t kFlagParts = 4;
 
-/// What PageEntry::parts is made of.
-inline constexpr uint8_t kPageHasClosed = 1, kPageHasOpen = 2;
+/// With kFlagParts: some pages have open marks (octree/shared/page_layout.h), and their entries say so.
+inline constexpr uint32_t kFlagMarks = 8;
+
+/// What PageEntry::parts is made of. kPageHasMarks: with both others only; marks tell which surface is whose.
+inline constexpr uint8_t kPageHasClosed = 1, kPageHasOpen = 2, kPageHasMarks = 4;
 
 /// Whether a file of this version can be read.
-constexpr bool isKnownVersion(uint32_t version) { return version >= kOldestFileVersion && version <= kFileVersion; }
+constexpr bool isKnownVersion(uint32_t version) {
+    return version >= kOldestFileVersion && version <= kNewestFileVersion;
+}
 static_assert(offsetof(FileHeader, origin) == 32 && offsetof(FileHeader, levels) == 128 &&
               offsetof(FileHeader, triangles) == 144);
 static_assert(offsetof(FileHeader, level) == 184 && offsetof(FileHeader, hash) == 184 + 24 * kMaxLevels &&
@@ -119,7 +126,7 @@ struct PageEntry {
     float certifiedError = 0;  ///< world units, rounded up
     uint8_t childMask = 0;     ///< octants that have a page on the next level
     uint8_t level = 0;
-    uint8_t parts = 0;  ///< with kFlagParts: the kinds of parts in it, kPageHasClosed and kPageHasOpen
+    uint8_t parts = 0;  ///< with kFlagParts: the kinds of parts in it, kPageHasClosed, kPageHasOpen, kPageHasMarks
     uint8_t reserved = 0;
     uint32_t slabLeaves = 0;
 };

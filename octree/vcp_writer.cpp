@@ -1,5 +1,6 @@
 #include "octree/vcp_writer.h"
 
+#include <algorithm>
 #include <cstring>
 
 #include "octree/io/content_hash.h"
@@ -70,6 +71,10 @@ Result<uint64_t> VcpWriter::commit(FileHeader header) {
     }
     VCP_TRY(file_.write(kDirectoryOffset, directory));
 
+    if (std::ranges::any_of(entries_, [](const PageEntry& e) { return (e.parts & kPageHasMarks) != 0; })) {
+        header.version = kMarkedFileVersion;
+        header.flags |= kFlagMarks;
+    }
     header.pages = pages_;
     header.fileBytes = end_ + sizeof(CommitRecord);
     header.hash = 0;

@@ -38,7 +38,7 @@ public:
     Result<void> append(PageEntry entry, const StoredPage& page);
 
     /// Writes header, directory and commit record, makes the file durable and gives it its name. The caller
-    /// fills the header but for sizes, flags of the layout and hashes. Returns the file's bytes. Errors: Io.
+    /// fills the header but for sizes, version, flags of the layout and hashes. Returns the file's bytes. Errors: Io.
     Result<uint64_t> commit(FileHeader header);
 
 private:

@@ -12,6 +12,7 @@
 #include <glm/vec3.hpp>
 
 #include "builder/lattice/soup.h"
+#include "octree/vcp_file.h"
 
 namespace vcp {
 
@@ -22,6 +23,12 @@ struct LatticeMesh {
     std::vector<std::array<uint32_t, 3>> triangles;  ///< none without area, none twice
     std::vector<float> stray;     ///< cells, one a triangle: how far its points may be from the mesh's, both ways
     std::vector<uint32_t> parts;  ///< that vertices belong to, as many as positions; empty: kClosedPart
+
+    /// Returns whether a triangle is of a closed part or of an open one, as PageEntry::parts says it.
+    [[nodiscard]] uint8_t kindOf(uint32_t triangle) const {
+        const bool isOpen = !parts.empty() && parts[triangles[triangle][0]] == kOpenPart;
+        return isOpen ? kPageHasOpen : kPageHasClosed;
+    }
 };
 
 /// Rounding a point to the lattice moves it at most so far, in cells.

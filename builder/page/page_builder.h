@@ -50,6 +50,7 @@ struct SlabLeaf {
     NodeBox box;
     uint32_t code = 0;              ///< packed slab (octree/shared/page_layout.h)
     uint32_t octants = 0;           ///< those that hold surface
+    uint32_t parts = 0;             ///< kinds of parts that its surface belongs to, as PageEntry's
     double error = 0;               ///< in its edges
     uint32_t colour = 0xffffffffu;  ///< RGBA8
 };

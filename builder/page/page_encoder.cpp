@@ -172,9 +172,10 @@ Clearance clearanceOf(const PageTree& tree) {
 /// Gives the triangles of the hard leaves and their vertices numbers in the page.
 class TrianglePacker {
 public:
-    TrianglePacker(const PageTree& tree, const LatticeMesh& mesh, PageDraft& draft)
+    TrianglePacker(const PageTree& tree, const LatticeMesh& mesh, bool withMarks, PageDraft& draft)
         : tree_(tree),
           mesh_(mesh),
+          withMarks_(withMarks),
           draft_(draft),
           numbers_(tree.triangles.size(), kNone),
           local_(tree.triangles.size()) {}
@@ -204,6 +205,7 @@ private:
         if (number == 0) {
             const glm::i32vec3 p = mesh_.positions[global] - tree_.originLattice + kLatticeBias;
             draft_.vertices.push_back(pack21(uint32_t(p.x), uint32_t(p.y), uint32_t(p.z)));
+            if (withMarks_ && mesh_.parts[global] == kOpenPart) draft_.vertices.back().y |= kVertexOpenBit;
             draft_.normals.push_back(mesh_.normals[global]);
             if (!mesh_.colours.empty()) colours.push_back(mesh_.colours[global]);
             number = uint32_t(draft_.vertices.size());
@@ -213,6 +215,7 @@ private:
 
     const PageTree& tree_;
     const LatticeMesh& mesh_;
+    bool withMarks_;
     PageDraft& draft_;
     std::vector<uint32_t> numbers_;  ///< of triangles, by local number
     PositionMap<uint32_t> local_;
@@ -221,8 +224,9 @@ private:
 /// Node words in breadth-first groups, so that children come after their parent.
 class NodePacker {
 public:
-    NodePacker(const PageTree& tree, const FacePacker& faces, TrianglePacker& triangles, Clearance& clearance)
-        : tree_(tree), faces_(faces), triangles_(triangles), clearance_(clearance) {
+    NodePacker(const PageTree& tree, const FacePacker& faces, TrianglePacker& triangles, bool withMarks,
+               Clearance& clearance)
+        : tree_(tree), faces_(faces), triangles_(triangles), withMarks_(withMarks), clearance_(clearance) {
         std::vector<uint32_t> queue;  // internal nodes, one a group
         root = word(0, queue);
         for (size_t i = 0; i < queue.size(); ++i)
@@ -246,8 +250,11 @@ private:
             }
             case TreeNode::Kind::Hard:
                 return triangles_.add(tree_.hard[n.index]);
-            case TreeNode::Kind::Slab:
-                return slabNode(tree_.slabs[n.index].octants, uint32_t(4 * faces_.faces.size()) + n.index);
+            case TreeNode::Kind::Slab: {
+                const SlabLeaf& leaf = tree_.slabs[n.index];
+                return slabNode(leaf.octants, uint32_t(4 * faces_.faces.size()) + n.index) |
+                       (withMarks_ && leaf.parts == kPageHasOpen ? kSlabOpenBit : 0u);
+            }
             default:
                 return emptyNode(
                     n.box.edge >= kSubcells ? clearance_.of(n.box.lower / kSubcells, n.box.edge / kSubcells) : 0);
@@ -257,6 +264,7 @@ private:
     const PageTree& tree_;
     const FacePacker& faces_;
     TrianglePacker& triangles_;
+    bool withMarks_;
     Clearance& clearance_;
 };
 
@@ -275,6 +283,14 @@ struct SlabVectors {
     std::vector<uint32_t> vectors, colours;
 };
 
+/// Returns the kinds of parts that a page's surface belongs to (PageEntry).
+uint8_t partsOf(const PageTree& tree, const LatticeMesh& mesh) {
+    uint32_t kinds = 0;
+    for (const uint32_t k : tree.triangles) kinds |= mesh.kindOf(k);
+    for (const SlabLeaf& leaf : tree.slabs) kinds |= leaf.parts;
+    return uint8_t(kinds == (kPageHasClosed | kPageHasOpen) ? kinds | kPageHasMarks : kinds);
+}
+
 EncodedPage encode(PageTree& tree, const LatticeMesh& mesh, bool withColour) {
     const LeafMap map(tree.soft);
     setWalls(tree, map);
@@ -282,9 +298,11 @@ EncodedPage encode(PageTree& tree, const LatticeMesh& mesh, bool withColour) {
     const SlabVectors slabs(tree);
     EncodedPage page;
     PageDraft& draft = page.draft;
-    TrianglePacker triangles(tree, mesh, draft);
+    page.parts = partsOf(tree, mesh);
+    const bool withMarks = (page.parts & kPageHasMarks) != 0;
+    TrianglePacker triangles(tree, mesh, withMarks, draft);
     Clearance clearance = clearanceOf(tree);
-    NodePacker nodes(tree, faces, triangles, clearance);
+    NodePacker nodes(tree, faces, triangles, withMarks, clearance);
 
     page.certifiedError = pageError(tree);
     page.hardLeaves = uint32_t(tree.hard.size());

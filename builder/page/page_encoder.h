@@ -17,10 +17,11 @@ struct EncodedPage {
     uint32_t leaves = 0;            ///< leaves of all kinds with surface
     uint32_t slabLeaves = 0;
     uint32_t hardLeaves = 0;
+    uint8_t parts = 0;          ///< as PageEntry's
     double certifiedError = 0;  ///< in cells: error of the leaves, stray of the level's mesh, and rounding
 };
 
-/// Encodes a page; sets the leaves' wall codes in `tree`.
+/// Encodes a page; sets the leaves' wall codes in `tree`. What is open has marks where something is closed.
 EncodedPage encodePage(PageTree& tree, const LatticeMesh& mesh);
 
 /// Encodes a page that has slab leaves only.

@@ -95,6 +95,7 @@ CellSurface foldEighths(std::span<const CellSurface> eighths, std::span<const ui
         cell.area += e.area / 4;
         for (size_t k = 0; k < 6; ++k) cell.moment[k] += e.moment[k] / 4;
         cell.light += e.light / 4.0f;
+        cell.parts |= e.parts;
     }
     chooseAxis(cell);
     const Extent extent = extentAlong(eighths, octants, glm::dvec3(cell.axis));

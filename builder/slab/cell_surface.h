@@ -22,6 +22,7 @@ struct CellSurface {
     float area = 0;                 ///< in squares of the edge
     std::array<float, 6> moment{};  ///< sums of area n n^T over the surface's normals n: xx, yy, zz, yz, zx, xy
     glm::vec4 light{0};             ///< sum of area * (linear RGB, alpha)
+    uint32_t parts = 0;             ///< kinds of parts that it belongs to, as PageEntry's
 };
 
 /// The values between which something lies.

@@ -87,7 +87,7 @@ private:
 
     SlabLeaf leafOf(const NodeBox& box, size_t level, size_t index, Run eighths) {
         const CellSurface& cell = levels_[level]->cells[index];
-        SlabLeaf leaf{.box = box, .error = kAnySlabError, .colour = meanColour(cell)};
+        SlabLeaf leaf{.box = box, .parts = cell.parts, .error = kAnySlabError, .colour = meanColour(cell)};
         const uint32_t direction = packSlabDirection(glm::dvec3(cell.axis));
         const glm::dvec3 n = f64::decodeDirection(direction);
         octants_.clear();

@@ -85,6 +85,7 @@ glm::vec4 TriangleCutter::lightOf(const Polygon& piece) const {
 TriangleCutter::Source TriangleCutter::sourceOf(uint32_t triangle) const {
     const auto& t = mesh_.triangles[triangle];
     Source source;
+    source.parts = mesh_.kindOf(triangle);
     for (size_t i = 0; i < 3; ++i)
         source.corners[i] = glm::dvec3(mesh_.positions[t[i]] - origin_) * (2.0 / double(kLatticePerCell));
     const auto& [a, b, c] = source.corners;
@@ -227,6 +228,7 @@ void TriangleCutter::keep(const Polygon& piece, glm::ivec3 cell) {
     kept.area = float(size / 2);
     kept.normal = glm::vec3(length > 0 ? normal / length : n[0]);
     kept.light = lightOf(piece);
+    kept.parts = source_.parts;
     const glm::dvec3 centre = glm::dvec3(cell) + 0.5;
     for (const glm::dvec3& p : piece) corners_.emplace_back(p - centre);
 }
@@ -242,6 +244,7 @@ CellSurface TriangleCutter::sum(std::span<const uint64_t> pieces) const {
         for (size_t k = 0; k < 6; ++k) cell.moment[k] += piece.area * products[k];
         cell.area += piece.area;
         cell.light += piece.area * piece.light;
+        cell.parts |= piece.parts;
     }
     chooseAxis(cell);
     double first = 2, last = -2;

@@ -45,6 +45,7 @@ private:
         std::array<glm::dvec3, 3> normal;
         std::array<glm::dvec4, 3> colour;  ///< as stored, 0 to 1, where the mesh has colours
         bool isPlain = true;               ///< all of it has the first corner's colour
+        uint32_t parts = 0;                ///< the kind of part that it belongs to, as PageEntry's
         /// Returns the weights of the corners at a point of the triangle.
         [[nodiscard]] glm::dvec3 weightsAt(glm::dvec3 p) const;
     };
@@ -68,6 +69,7 @@ private:
         float area;
         glm::vec3 normal;  ///< unit
         glm::vec4 light;   ///< mean: linear RGB, alpha
+        uint32_t parts;    ///< as the source's
     };
     /// Whether a triangle's bounds reach the box.
     [[nodiscard]] bool mayReach(uint32_t triangle) const;

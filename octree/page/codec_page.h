@@ -72,6 +72,7 @@ struct CodecPage {
     /// Encoder: which element of `source` each one is; faces are those of soft leaves, vectors those of slab leaves.
     std::vector<uint32_t> groupSource, faceSource, vectorSource, vertexSource;
 
+    bool hasMarks = false;                  ///< whether open marks are coded
     uint32_t mostEntries = kHardFirstMask;  ///< a page may not ask for more memory or work than its size allows
     bool wrong = false;                     ///< decoder: the bytes are no page; encoder: the page needs the plain form
 

@@ -1,6 +1,6 @@
 // Codes the triangles of the hard leaves: the surface grows across its edges, vertices are predicted by the
 // parallelogram rule (Touma and Gotsman 1998) and the plane behind it, normals from the triangles; which leaf holds
-// which triangle follows from where they are. Part of page_codec.
+// which triangle follows from where they are. Triangles that share an edge share their mark. Part of page_codec.
 #pragma once
 
 #include <algorithm>
@@ -125,6 +125,8 @@ private:
             number = source_.nextSeed();
             old = source_.vertices(number);
         }
+        bool isOpen = Coder::kEncodes && isOpenVertex(page_.source->vertices[old[0]]);
+        if (page_.hasMarks) coder_.bit(open_, isOpen);
         for (size_t i = 0; i < 3 && !page_.wrong; ++i) {
             if constexpr (Coder::kEncodes) t[i] = source_.numberOf(old[i]);
             bool fresh = t[i] == kNone;
@@ -144,6 +146,7 @@ private:
             if constexpr (Coder::kEncodes) more = source_.take(old[i], t[i]) - near;
             for (int axis = 0; axis < 3; ++axis) seedVertex_[i > 0 ? 1 : 0].code(coder_, more[axis]);
             place(near + more);
+            mark(isOpen);
         }
         if (page_.wrong) return;
         if (t[0] == t[1] || t[1] == t[2] || t[2] == t[0]) {
@@ -181,6 +184,7 @@ private:
             more[k] = rest + flat;
         }
         place(foretold + more);
+        mark(isMarked(gate.from));
     }
 
     /// For walls and isosurfaces: codes which coordinates are those of a corner of the gate's triangle. Sets `more`.
@@ -227,6 +231,12 @@ private:
         positions_.push_back(position);
         inHard_.push_back(places_.typeAt(position) == kNodeHard ? 1 : 0);
     }
+
+    /// Gives the latest vertex its mark.
+    void mark(bool isOpen) {
+        if (isOpen && !page_.wrong) page_.vertices[positions_.size() - 1].y |= kVertexOpenBit;
+    }
+    [[nodiscard]] bool isMarked(uint32_t vertex) const { return isOpenVertex(page_.vertices[vertex]); }
 
     void add(uint32_t a, uint32_t b, uint32_t c, uint32_t number) {
         if constexpr (Coder::kEncodes) source_.done(number, uint32_t(triangles_.size()));
@@ -384,7 +394,7 @@ private:
     SignedModel seedVertex_[2], vertex_[6][5], height_[6][4], normal_[8];
     BitModel anyLevel_[8];
     SymbolModel level_[8];
-    BitModel plainNormal_, crease_[2][2], otherNormal_[2];
+    BitModel plainNormal_, crease_[2][2], otherNormal_[2], open_;
 };
 
 }  // namespace vcp

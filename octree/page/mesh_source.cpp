@@ -11,8 +11,9 @@ MeshSource::MeshSource(const PageDraft& page)
       vertices_(page.triangles),
       newTriangle_(page.triangles.size(), kNone),
       newVertex_(page.vertices.size(), kNone) {
+    const auto isOpen = [&](uint32_t vertex) { return isOpenVertex(positions_[vertex]); };
     for (const auto& [a, b, c] : vertices_)
-        if (a == b || b == c || c == a) wrong_ = true;
+        if (a == b || b == c || c == a || isOpen(a) != isOpen(b) || isOpen(b) != isOpen(c)) wrong_ = true;
     oldVertex_.reserve(page.vertices.size());
     linkVertices(uint32_t(page.vertices.size()));
 }

@@ -19,7 +19,7 @@ public:
     /// The draft must outlive this.
     explicit MeshSource(const PageDraft& page);
 
-    /// Whether a triangle names a vertex twice.
+    /// Whether a triangle names a vertex twice, or a part of its vertices have a mark.
     [[nodiscard]] bool wrong() const { return wrong_; }
     [[nodiscard]] uint32_t triangles() const { return uint32_t(vertices_.size()); }
     /// The vertices of a triangle, as the page numbers them.

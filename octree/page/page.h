@@ -81,6 +81,9 @@ inline double nodeClearance(uint32_t node) { return (node & kNodePayloadMask) / 
 /// Which octants of a slab leaf hold surface, as bits, and the number of its vector.
 inline uint32_t slabOctants(uint32_t node) { return node >> kSlabOctantsShift & kSlabOctantsMask; }
 inline uint32_t slabVector(uint32_t node) { return node & kSlabVectorMask; }
+/// Whether a slab leaf, or a vertex, has an open mark.
+inline bool isOpenSlab(uint32_t node) { return (node & kSlabOpenBit) != 0; }
+inline bool isOpenVertex(glm::u32vec2 vertex) { return (vertex.y & kVertexOpenBit) != 0; }
 /// The word of a vector in the section of faces, or of its colour in the colours of faces.
 inline const uint32_t& vectorWord(std::span<const uint4> faces, uint32_t vector) {
     return reinterpret_cast<const uint32_t*>(faces.data())[vector];

@@ -17,7 +17,7 @@ namespace vcp {
 
 namespace {
 
-constexpr std::byte kPlain{0}, kCoded{1};
+constexpr std::byte kPlain{0}, kCoded{1}, kMarked{2};
 constexpr int kPlainLevel = 3;
 
 Error broken(std::string message) { return {.code = ErrorCode::InvalidInput, .message = std::move(message)}; }
@@ -38,8 +38,8 @@ Result<std::vector<uint4>> unpackPlain(std::span<const std::byte> packed, uint64
     return out;
 }
 
-std::vector<std::byte> coded(RangeEncoder& coder) {
-    std::vector<std::byte> out{kCoded};
+std::vector<std::byte> coded(RangeEncoder& coder, std::byte form = kCoded) {
+    std::vector<std::byte> out{form};
     coder.finish(out);
     return out;
 }
@@ -109,6 +109,7 @@ std::optional<PackedPage> codedPage(const PageDraft& draft, std::span<const std:
     page.header = draft.header;
     page.header.entries = 0;
     page.source = &draft;
+    page.hasMarks = draft.hasMarks();
     // Whatever the strips will take, it is what the page is to be.
     if (!plausible(page.header, pageSections(page.header).end)) return {};
     page.allocate();
@@ -118,7 +119,7 @@ std::optional<PackedPage> codedPage(const PageDraft& draft, std::span<const std:
     if (page.wrong) return {};
     const auto view = parsePage(std::as_bytes(std::span(page.block)));
     if (!view) return {};
-    PackedPage packed{coded(coder), {}, page.block.size() * sizeof(uint4)};
+    PackedPage packed{coded(coder, page.hasMarks ? kMarked : kCoded), {}, page.block.size() * sizeof(uint4)};
     if (colour.empty()) return packed;
     std::vector<uint4> block = inOrder(colour, page);
     RangeEncoder colourCoder;
@@ -146,9 +147,10 @@ PackedPage packPage(std::span<const std::byte> geometry, std::span<const std::by
 Result<std::vector<uint4>> unpackGeometry(std::span<const std::byte> packed, uint64_t pageBytes) {
     if (packed.empty()) return broken("page does not decode: it is empty");
     if (packed[0] == kPlain) return unpackPlain(packed.subspan(1), pageBytes);
-    if (packed[0] != kCoded) return broken("page does not decode: unknown form");
+    if (packed[0] != kCoded && packed[0] != kMarked) return broken("page does not decode: unknown form");
     RangeDecoder coder(packed.subspan(1));
     CodecPage page;
+    page.hasMarks = packed[0] == kMarked;
     codeHeader(coder, page.header);
     if (!plausible(page.header, pageBytes)) return broken("page does not decode to its size");
     page.mostEntries = uint32_t(std::min<uint64_t>(

@@ -1,6 +1,7 @@
 // How pages are stored in the file: all that follows from the rest is left out, and what remains is range coded.
 //
-//   byte 0     0: plain: a zstd frame of the page follows; 1: coded, two streams (range_coder.h) follow
+//   byte 0     0: plain: a zstd frame of the page follows; 1: coded, two streams (range_coder.h) follow; 2: as 1, with
+//              open marks: of each slab leaf, and of each run of triangles that grows from a first one
 //   nodes      types, breadth first; wall and dip codes; clearances as differences from what the types allow
 //   faces      runs of soft leaves; the vector of each of their corners once, foretold by its neighbours
 //   slabs      the vector of each slab leaf, foretold by the planes beside it; its octants, foretold by its plane

@@ -18,6 +18,12 @@ void forEachWord(Page& page, Visit&& visit) {
 
 }  // namespace
 
+bool PageDraft::hasMarks() const {
+    bool isMarked = std::ranges::any_of(vertices, isOpenVertex);
+    forEachWord(*this, [&](uint32_t word) { isMarked |= nodeType(word) == kNodeSlab && isOpenSlab(word); });
+    return isMarked;
+}
+
 std::vector<std::byte> pageOf(const PageDraft& draft) {
     struct {
         PageHeader header;

@@ -38,6 +38,9 @@ struct PageDraft {
     LeafLists lists;
     /// Whether it is certain that each list names all triangles that touch its leaf's closed box, and no others.
     bool listsAreCertain = false;
+
+    /// Whether some of it has an open mark.
+    [[nodiscard]] bool hasMarks() const;
 };
 
 /// The word of a hard leaf in a draft, and the number of its list.

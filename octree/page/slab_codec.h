@@ -34,6 +34,7 @@ private:
 
     struct Leaf {
         uint32_t octants = 0;
+        bool isOpen = false;
         GridDirection normal{0};
         int offset = 0;     ///< along `normal`, fine
         int thickness = 0;  ///< the code
@@ -51,9 +52,10 @@ private:
             code = vectorWord(page_.source->faces, slabVector(source));
             page_.vectorSource.push_back(slabVector(source));
         }
-        const Leaf made = vector(code);
+        Leaf made = vector(code);
+        if (page_.hasMarks) made.isOpen = codeMark(isOpenSlab(source));
         const uint32_t octants = codeOctants(slabOctants(source), made);
-        word |= octants << kSlabOctantsShift | nextVector_;
+        word |= octants << kSlabOctantsShift | (made.isOpen ? kSlabOpenBit : 0u) | nextVector_;
         reinterpret_cast<uint32_t*>(page_.faces.data())[nextVector_++] = code;
         Leaf& kept = leaves_.findOrAdd(leafKey(place.lower(), place.edge));
         kept = made;
@@ -88,6 +90,13 @@ private:
         code = (uint32_t(offset) & kSlabOffsetMask) | uint32_t(made.thickness) << kSlabThicknessShift |
                direction << kSlabDirectionShift;
         return made;
+    }
+
+    bool codeMark(bool isOpen) {
+        int open = 0;
+        for (int i = 0; i < count_; ++i) open += neighbours_[i].leaf->isOpen ? 1 : 0;
+        coder_.bit(open_[count_ == 0 ? 0 : open == 0 ? 1 : open < count_ ? 2 : 3], isOpen);
+        return isOpen;
     }
 
     int codeThickness(int thickness) {
@@ -181,7 +190,7 @@ private:
     const Leaf* beside_[3][2] = {};
     int count_ = 0;  ///< neighbours of the leaf at hand
     GridDirection last_{0};
-    BitModel turned_[2], octant_[16][16];
+    BitModel turned_[2], octant_[16][16], open_[4];
     SymbolModel thickness_[17];
     NumberModel thicker_;
     DirectionModel direction_[3][4];

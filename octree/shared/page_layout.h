@@ -10,7 +10,8 @@
 //   64                32 * groups         nodes: groups of 8 child words, child i at octant x + 2y + 4z
 //   ...               16 * faces          faces: 4 packed vectors each, see "soft leaf"; then the vectors of slab
 //                                         leaves, four to a face, see "slab leaf"
-//   ...               8 * vertices        vertices of the hard leaves' triangles: 3 coordinates, 21 bits each
+//   ...               8 * vertices        vertices of the hard leaves' triangles: 3 coordinates, 21 bits each, and
+//                                         in the highest bit an open mark
 //   ...               4 * vertices        their normals, octahedral 16 + 16 bits, and a crease flag
 //   ...               2 or 4 * entries    strips of those triangles, see "hard leaf"
 //
@@ -22,7 +23,7 @@
 //   01 empty      bit 29: 0; bits 28..0: clearance in 1/256 cell, rounded down. The node's box, grown by it on
 //                 every side and clamped to the page, holds no surface (so a ball of it is safe too)
 //   01 slab leaf  bit 29: 1; bits 28..21: the octants that hold surface, octant x + 2y + 4z at bit 21 + octant,
-//                 at least one; bits 20..0: number of its vector
+//                 at least one; bit 20: an open mark; bits 19..0: number of its vector
 //   10 soft leaf  bits 21..0: first face; 23..22: axis; 27..24: wall code; 29..28: dip code
 //   11 hard leaf  bits 23..0: first entry of its strips; 29..24: number of triangles, 1 to 62; 63: its
 //                 first two entries hold the number, 14 bits each, low bits first, and the strips follow
@@ -39,6 +40,10 @@
 //   bits 6..0     offset: kSlabOffsetUnit * (code - 64) leaf edges
 //   bits 11..7    half thickness: kSlabThicknessUnit * code^2 leaf edges
 //   bits 31..12   direction, octahedral, 10 + 10 bits; n and -n mean the same
+//
+// Open marks: a surface that has ends, where a page holds such ones beside closed ones (PageEntry::parts). All three
+// vertices of a triangle have the mark, or none. A slab leaf has it where all of its surface is open; soft leaves have
+// none.
 //
 // Hard leaf: strips of oriented triangles, one after the other; leaves share no entries. An entry has 16 bits
 // where the page has at most kShortEntryVertices vertices, else 32. Its two top bits are a step, the rest is the
@@ -64,7 +69,8 @@ const uint kSoftAxisShift = 22u;
 const uint kSoftWallShift = 24u;
 const uint kSoftWallMask = 15u;
 const uint kSoftDipShift = 28u;
-const uint kSlabVectorMask = 0x1fffffu;
+const uint kSlabVectorMask = 0xfffffu;
+const uint kSlabOpenBit = 0x100000u;
 const uint kSlabOctantsShift = 21u;
 const uint kSlabOctantsMask = 255u;
 const uint kHardFirstMask = 0xffffffu;
@@ -83,6 +89,7 @@ const uint kMaxSubcellDepth = 3u;
 // 21-bit fields of vertices. They sit on the level's lattice: 2048 steps a cell, from
 // 512 cells below the page's origin to 512 cells above it.
 const uint kField21Mask = 0x1fffffu;
+const uint kVertexOpenBit = 0x80000000u;  // in the second word
 const int kLatticePerCell = 2048;
 const int kLatticeBias = 1048576;
 

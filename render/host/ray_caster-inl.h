@@ -54,6 +54,8 @@ public:
 
     /// The leaf of the last hit. Precondition: next() returned a distance.
     [[nodiscard]] const WalkEntry& hitLeaf() const { return hit_; }
+    /// A vertex of the triangle of that hit. Precondition: besides, the leaf is hard.
+    [[nodiscard]] uint32_t hitVertex() const { return leaves_.hitVertex(); }
 
 private:
     void visitNode(const WalkEntry& at) {

@@ -25,7 +25,7 @@ constexpr double kLinePixels = 1, kLeastCosine = 1e-3;
 /// Counts the walls that rays cross.
 class WallCounter {
 public:
-    /// `ofClosed`: pages of open parts have no walls.
+    /// `ofClosed`: open parts have no walls.
     WallCounter(const HostScene& scene, bool ofClosed, PageMarks* marks)
         : scene_(scene), ofClosed_(ofClosed), caster_(scene, marks) {}
 
@@ -44,16 +44,27 @@ public:
         return inside == 2 ? wall : std::nullopt;
     }
 
-    /// Returns the first wall between two points, if its page has open parts.
+    /// Returns the first wall between two points, if it may be of an open part.
     std::optional<WalkEntry> openBetween(glm::dvec3 from, glm::dvec3 to) {
         const auto length = float(glm::distance(from, to));
         caster_.begin(from, glm::vec3(glm::normalize(to - from)), length);
         if (!(caster_.next(0) <= length)) return std::nullopt;
         const WalkEntry& leaf = caster_.hitLeaf();
-        return (scene_.page(leaf.page).parts & kPageHasOpen) != 0 ? std::optional(leaf) : std::nullopt;
+        return (kindsOfHit() & kPageHasOpen) != 0 ? std::optional(leaf) : std::nullopt;
     }
 
 private:
+    /// Returns of which kinds of parts the wall of the last hit may be (PageEntry).
+    [[nodiscard]] uint32_t kindsOfHit() const {
+        const WalkEntry& leaf = caster_.hitLeaf();
+        const HostScene::Page& page = scene_.page(leaf.page);
+        if ((page.parts & kPageHasMarks) == 0) return page.parts;
+        const uint32_t type = nodeType(leaf.word);
+        const bool isOpen = (type == kNodeSlab && isOpenSlab(leaf.word)) ||
+                            (type == kNodeHard && isOpenVertex(page.view->vertices[caster_.hitVertex()]));
+        return isOpen ? kPageHasOpen : kPageHasClosed;
+    }
+
     /// `first` gets the first wall that any ray crosses.
     int crossings(glm::dvec3 point, glm::vec3 direction, std::optional<WalkEntry>& first) {
         caster_.begin(point, direction, RayCaster::kNothing);
@@ -66,7 +77,7 @@ private:
             const WalkEntry& leaf = caster_.hitLeaf();
             const HostScene::Page& page = scene_.page(leaf.page);
             const auto cell = float(1u << page.cellBits);
-            if (ofClosed_ && page.parts == kPageHasOpen) {
+            if (ofClosed_ && kindsOfHit() == kPageHasOpen) {
                 gap += distance - from + kPastHit * cell;
                 from = distance + kPastHit * cell;
                 continue;

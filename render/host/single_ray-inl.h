@@ -52,6 +52,9 @@ public:
         return u < 0 ? kNothing : float(part.distance) + (part.first + u * (part.last - part.first)) * float(edge);
     }
 
+    /// A vertex of the triangle that was hit last. Precondition: a triangle was hit.
+    [[nodiscard]] uint32_t hitVertex() const { return hitVertex_; }
+
 private:
     /// The part of the ray that is in a leaf: from p over p + d in leaf space, and where that is along the ray.
     struct Part {
@@ -109,6 +112,7 @@ private:
                     f32::intersectTriangle(from, ray.direction, vertex(0), vertex(1), vertex(2), f32::kTriangleSlack);
                 if (!(hit.x >= least && hit.x <= best)) continue;
                 best = hit.x;
+                hitVertex_ = t.corners[0][k];
                 isHit = true;
             }
         });
@@ -167,6 +171,7 @@ private:
     static constexpr uint32_t kDecodedLeaves = 64;
 
     const HostScene& scene_;
+    uint32_t hitVertex_ = 0;
     DecodedLeaf decoded_[kDecodedLeaves];
 };
 

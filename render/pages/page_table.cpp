@@ -44,6 +44,7 @@ Parts partsOf(const Dataset& dataset, std::span<const uint64_t> cut, std::span<c
 }
 
 uint32_t partFlags(uint8_t parts) {
+    if ((parts & kPageHasMarks) != 0) return frame::kRecordHasMarks;
     return ((parts & kPageHasOpen) != 0 ? frame::kRecordHasOpen : 0u) |
            (parts == kPageHasOpen ? frame::kRecordIsOpen : 0u);
 }
@@ -68,7 +69,8 @@ frame::TableRecord recordOf(const ResidentPage& page, uint64_t entry, uint8_t pa
 
 frame::TableRecord octantOf(const Dataset& dataset, const frame::TableRecord& page, uint32_t octant, uint32_t root) {
     frame::TableRecord record = page;
-    constexpr uint32_t kKept = frame::kRecordErrorMask | frame::kRecordHasOpen | frame::kRecordIsOpen;
+    constexpr uint32_t kKept =
+        frame::kRecordErrorMask | frame::kRecordHasOpen | frame::kRecordIsOpen | frame::kRecordHasMarks;
     record.node.flags =
         (page.node.flags & kKept) | frame::kRecordResident | frame::kRecordInCut | frame::kRecordIsOctant;
     record.node.firstChild = 0;

@@ -52,9 +52,31 @@ const float kLinePixels = 1.0;
 // Planes that are seen from so near their edge, as a cosine, show no such lines.
 const float kLeastCosine = 1e-3;
 
-// Whether a hit's page has one of these kinds of parts (kRecordHasOpen, kRecordIsOpen).
+// Whether a hit has an open mark. The kind of leaf that none of the rays in lock step has hit is skipped.
+bool isMarkedOpen(Hit hit) {
+    bool isOpen = nodeType(hit.leaf) == kNodeSlab && (hit.leaf & kSlabOpenBit) != 0u;
+    bool hard = nodeType(hit.leaf) == kNodeHard;
+    while (hard) {
+        isOpen = (fetchPair(fetchTableSections(hit.record).vertices, hit.corners.x).y & kVertexOpenBit) != 0u;
+        hard = false;
+    }
+    return isOpen;
+}
+
+// Whether a hit is of one of these kinds of parts (kRecordHasOpen, kRecordIsOpen), by its page, or by its marks.
 bool hasParts(Hit hit, uint kind) {
-    return kSections == 3u && hit.depth < kNoHit && (fetchTableNode(hit.record).flags & kind) != 0u;
+    bool looks = kSections == 3u && hit.depth < kNoHit, has = false;
+    while (looks) {
+        uint flags = fetchTableNode(hit.record).flags;
+        has = (flags & kind) != 0u;
+        bool marked = (flags & kRecordHasMarks) != 0u;
+        while (marked) {
+            has = isMarkedOpen(hit);
+            marked = false;
+        }
+        looks = false;
+    }
+    return has;
 }
 
 // Whether a point in a section plane, the ray's origin, is inside of the solid: an odd number of walls lies

@@ -18,6 +18,7 @@
 
 #include "octree/dataset_reader.h"
 #include "octree/reference_caster.h"
+#include "octree/surface/packing.h"
 #include "octree/vcp_verify.h"
 #include "tests/support/mesh_files.h"
 #include "tests/support/test_folder.h"
@@ -108,7 +109,8 @@ TEST_F(Build, SaysWhichPartsAreClosed) {
     EXPECT_EQ(built.header.parts, 3u);
     EXPECT_EQ(built.header.closedParts, 2u);
     EXPECT_GT(built.header.openEdges, 10u);
-    EXPECT_EQ(built.pages[0].parts, kPageHasClosed | kPageHasOpen);
+    EXPECT_EQ(built.pages[0].parts, kPageHasClosed | kPageHasOpen | kPageHasMarks);
+    EXPECT_EQ(built.header.version, kMarkedFileVersion);
     uint64_t closed = 0, open = 0;
     for (uint64_t i = 0; i < built.header.pages; ++i) {
         const PageEntry& page = built.pages[i];
@@ -120,6 +122,79 @@ TEST_F(Build, SaysWhichPartsAreClosed) {
     }
     EXPECT_GT(closed, 3u);
     EXPECT_GT(open, 0u);
+    expectIntact();
+}
+
+/// A ball in an open tube: pages hold some of both.
+IndexedMesh ballInTube() {
+    IndexedMesh mesh = test::sphereMesh({0, 0, 0}, 1, 40);
+    test::append(mesh, test::gridSurface(60, 20, false, [](double u, double v) {
+                     const double angle = test::kTwoPi * u;
+                     return glm::dvec3(1.3 * std::cos(angle), 1.3 * std::sin(angle), 2 * v - 1);
+                 }));
+    return mesh;
+}
+
+struct MarkCounts {
+    uint64_t open = 0, closed = 0;
+};
+
+/// Calls `visit(word, lower, edge)` for the leaves of a page; world units.
+template <class Visit>
+void forEachLeaf(const PageView& view, uint32_t word, glm::dvec3 lower, double edge, const Visit& visit) {
+    if (nodeType(word) != kNodeInternal) return visit(word, lower, edge);
+    for (uint32_t o = 0; o < 8; ++o)
+        forEachLeaf(view, view.nodes[8 * size_t{word} + o], lower + edge / 2 * glm::dvec3(o & 1, o >> 1 & 1, o >> 2),
+                    edge / 2, visit);
+}
+
+// What is nearer to the axis than 1.15 is of the ball, what is farther of the tube.
+TEST_F(Build, MarksTellOpenPartsFromClosedOnes) {
+    BuildOptions o = options({ply(ballInTube())});
+    o.cell = 0.04;
+    ASSERT_TRUE(buildOctree(o).ok());
+    auto cache = PageCache::open(o.output);
+    ASSERT_TRUE(cache.ok()) << cache.error().line();
+    ASSERT_TRUE(cache->loadAll().ok());
+    const Dataset& built = cache->dataset();
+    ASSERT_EQ(built.header.parts, 2u);
+    ASSERT_EQ(built.header.closedParts, 1u);
+    MarkCounts vertices, slabs;
+    const auto fromAxis = [](glm::dvec3 p) { return glm::length(glm::dvec2(p)); };
+    for (uint64_t i = 0; i < built.header.pages; ++i) {
+        const PageEntry& entry = built.pages[i];
+        if (entry.leaves == 0) continue;
+        const PageView& view = *cache->view(i);
+        const bool hasMarks = (entry.parts & kPageHasMarks) != 0;
+        EXPECT_EQ(hasMarks, entry.parts > 2) << i;
+        const glm::dvec3 origin = built.originOf(entry);
+        const double step = built.cellOf(entry.level) / kLatticePerCell;
+        for (const glm::u32vec2 vertex : view.vertices) {
+            const glm::dvec3 at = origin + step * (glm::dvec3(unpack21(vertex)) - double(kLatticeBias));
+            const bool isOpen = fromAxis(at) > 1.15;
+            EXPECT_EQ(isOpenVertex(vertex), isOpen && hasMarks) << i;
+            if (!hasMarks) EXPECT_EQ(entry.parts, isOpen ? kPageHasOpen : kPageHasClosed) << i;
+            ++(isOpenVertex(vertex) ? vertices.open : vertices.closed);
+        }
+        forEachLeaf(
+            view, view.header.root, origin, built.edgeOf(entry), [&](uint32_t word, glm::dvec3 low, double edge) {
+                if (nodeType(word) != kNodeSlab) return;
+                // Whether all of its box, and some of it, is nearer than the ball or farther than the tube reaches.
+                double nearest = 9, farthest = 0;
+                for (int corner = 0; corner < 8; ++corner) {
+                    const double r = fromAxis(low + edge * glm::dvec3(corner & 1, corner >> 1 & 1, corner >> 2));
+                    nearest = std::min(nearest, r);
+                    farthest = std::max(farthest, r);
+                }
+                if (nearest > 1.01 && hasMarks) EXPECT_TRUE(isOpenSlab(word)) << i;
+                if (farthest < 1.29) EXPECT_FALSE(isOpenSlab(word)) << i;
+                ++(isOpenSlab(word) ? slabs.open : slabs.closed);
+            });
+    }
+    for (const MarkCounts& counts : {vertices, slabs}) {
+        EXPECT_GT(counts.open, 100u);
+        EXPECT_GT(counts.closed, 100u);
+    }
     expectIntact();
 }
 

@@ -350,7 +350,7 @@ TEST_F(VcpFile, WrongMagicAndVersion) {
     ASSERT_FALSE(future.ok());
     EXPECT_EQ(future.error().code, ErrorCode::Unsupported);
     EXPECT_NE(future.error().line().find("17"), std::string::npos) << future.error().line();
-    EXPECT_NE(future.error().line().find(fmt::format("versions {} to {}", kOldestFileVersion, kFileVersion)),
+    EXPECT_NE(future.error().line().find(fmt::format("versions {} to {}", kOldestFileVersion, kNewestFileVersion)),
               std::string::npos);
 
     version[8] = std::byte{2};
@@ -359,7 +359,7 @@ TEST_F(VcpFile, WrongMagicAndVersion) {
     EXPECT_EQ(past.error().code, ErrorCode::Unsupported);
     EXPECT_EQ(
         past.error().line(),
-        "memory.vcp: header: byte 8: file version 2 is not known; this program reads versions 3 to 6: build it again");
+        "memory.vcp: header: byte 8: file version 2 is not known; this program reads versions 3 to 7: build it again");
 }
 
 TEST_F(VcpFile, HeaderLiesAreFound) {
@@ -453,6 +453,56 @@ TEST_F(VcpFile, WhatIsSaidOfPartsIsChecked) {
     said.header().version = 5;
     said.seal();
     EXPECT_FALSE(readDataset(MemoryFile(said.bytes)).ok());
+}
+
+TEST_F(VcpFile, WhatIsSaidOfMarksIsChecked) {
+    const auto say = [](Forgery& f, uint32_t version = kMarkedFileVersion) {
+        f.header().version = version;
+        f.header().flags |= kFlagParts | kFlagMarks;
+        f.header().parts = 3, f.header().closedParts = 2, f.header().openEdges = 40;
+        for (uint64_t i = 0; i < f.header().pages; ++i)
+            f.entry(i).parts = uint8_t(i == 0 ? kPageHasClosed | kPageHasOpen | kPageHasMarks : kPageHasClosed);
+    };
+    Forgery said{bytes_};
+    say(said);
+    said.seal();
+    const auto knows = readDataset(MemoryFile(said.bytes));
+    ASSERT_TRUE(knows.ok()) << knows.error().line();
+    EXPECT_EQ(knows->pages[0].parts, 7);
+    // Marks tell two kinds apart: where there is one, there are none.
+    for (const uint8_t parts : {4, 5, 6, 8, 15})
+        expectRefused("kinds of parts out of range", [&](Forgery& f) { say(f), f.entry(1).parts = parts; });
+    expectRefused("flags 0x8 are not known", [&](Forgery& f) { say(f, 6); });
+    expectRefused("kinds of parts out of range", [&](Forgery& f) { say(f), f.header().flags &= ~kFlagMarks; });
+    // Without marks a file may be of the newer version all the same.
+    Forgery plain{bytes_};
+    plain.header().version = kMarkedFileVersion;
+    plain.seal();
+    EXPECT_TRUE(readDataset(MemoryFile(plain.bytes)).ok());
+}
+
+TEST_F(VcpFile, MarksAskForTheNewerVersion) {
+    const TestFolder folder("vcp_marks_version_test");
+    for (const uint8_t parts : {kPageHasClosed, uint8_t{3}, uint8_t{7}}) {
+        auto writer = VcpWriter::create(folder / "one.vcp", 1);
+        ASSERT_TRUE(writer.ok());
+        StoredPage page;
+        page.geometry.resize(40);
+        page.geometryBytes = 1024;
+        ASSERT_TRUE((*writer)->append({.leaves = 3, .parts = parts}, page).ok());
+        FileHeader h;
+        h.levels = 1;
+        h.log2Cells = 5;
+        h.cell = 1;
+        h.flags = kFlagParts;
+        h.parts = 2, h.closedParts = 1;
+        h.level[0] = {0, 1, 0};
+        ASSERT_TRUE((*writer)->commit(h).ok());
+        const auto read = readDataset(MemoryFile(bytesOf(folder / "one.vcp")));
+        ASSERT_TRUE(read.ok()) << read.error().line();
+        EXPECT_EQ(read->header.version, parts == 7 ? 7u : 6u);
+        EXPECT_EQ(read->header.flags, parts == 7 ? kFlagParts | kFlagMarks : kFlagParts);
+    }
 }
 
 TEST_F(VcpFile, HugeCountsAllocateNothing) {

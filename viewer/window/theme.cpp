@@ -1,21 +1,13 @@
 #include "viewer/window/theme.h"
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
-#include <cstdlib>
-
-#include "viewer/camera/text_file.h"
 
 namespace vcp {
 
 namespace {
 
-namespace fs = std::filesystem;
-
-constexpr size_t kLargestFile = 64 << 10;
 constexpr float kLeastWidth = 320, kLeastHeight = 240, kLargestScale = 4;
-constexpr float kDarkestLight = 128;  // of a window's ground, 0 to 255: below it a theme is dark
 
 constexpr ImU32 rgb(uint32_t hex, uint32_t alpha = 255) {
     return IM_COL32(hex >> 16 & 255, hex >> 8 & 255, hex & 255, alpha);
@@ -47,60 +39,6 @@ constexpr Palette kLight{.ground = rgb(0xf6f7f9),
                          .halo = rgb(0xffffff, 190)};
 
 ImVec4 colour(ImU32 packed) { return ImGui::ColorConvertU32ToFloat4(packed); }
-
-std::string lowered(std::string text) {
-    std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return char(std::tolower(c)); });
-    return text;
-}
-
-/// Returns the value of "key=value" in a section of an .ini file; empty where there is none. Keys in any case.
-std::string valueOf(const std::string& ini, const std::string& section, const std::string& key) {
-    bool isInside = false;
-    for (size_t from = 0; from < ini.size();) {
-        const size_t end = std::min(ini.find('\n', from), ini.size());
-        std::string line = ini.substr(from, end - from);
-        from = end + 1;
-        std::erase_if(line, [](unsigned char c) { return std::isspace(c) != 0; });
-        if (line.starts_with('[')) isInside = lowered(line) == "[" + section + "]";
-        if (isInside && lowered(line).starts_with(key + "=")) return line.substr(key.size() + 1);
-    }
-    return {};
-}
-
-std::string textOf(const fs::path& file) {
-    const auto text = readText(file, kLargestFile, "a file of settings");
-    return text ? *text : std::string();
-}
-
-/// Returns whether a theme's name says that it is dark: "Adwaita:dark", "Yaru-dark", "BreezeDark".
-bool namesDark(const std::string& theme) { return lowered(theme).find("dark") != std::string::npos; }
-
-std::optional<bool> gtkIsDark(const fs::path& file) {
-    const std::string ini = textOf(file);
-    const std::string prefers = lowered(valueOf(ini, "settings", "gtk-application-prefer-dark-theme"));
-    const std::string theme = valueOf(ini, "settings", "gtk-theme-name");
-    if (prefers == "1" || prefers == "true" || namesDark(theme)) return true;
-    if (!prefers.empty() || !theme.empty()) return false;
-    return std::nullopt;
-}
-
-/// KDE notes the colours themselves: "BackgroundNormal=49,54,59".
-std::optional<bool> kdeIsDark(const fs::path& file) {
-    const std::string ini = textOf(file);
-    const std::string ground = valueOf(ini, "colors:window", "backgroundnormal");
-    float light = 0;
-    const char* at = ground.c_str();
-    for (int i = 0; i < 3; ++i) {
-        char* end = nullptr;
-        light += std::strtof(at, &end) / 3;
-        if (end == at) {
-            const std::string scheme = valueOf(ini, "general", "colorscheme");
-            return scheme.empty() ? std::nullopt : std::optional(namesDark(scheme));
-        }
-        at = *end == ',' ? end + 1 : end;
-    }
-    return light < kDarkestLight;
-}
 
 }  // namespace
 
@@ -152,26 +90,8 @@ float layoutScale(float display, int width, int height) {
     return std::floor(scale * 4 + 0.01f) / 4;
 }
 
-std::optional<bool> desktopIsDark(const std::function<std::string(const char*)>& variable, const fs::path& config) {
-    if (const std::string theme = variable("GTK_THEME"); !theme.empty()) return namesDark(theme);
-    const auto gtk = [&] {
-        const auto four = gtkIsDark(config / "gtk-4.0" / "settings.ini");
-        return four ? four : gtkIsDark(config / "gtk-3.0" / "settings.ini");
-    };
-    const bool isKde = lowered(variable("XDG_CURRENT_DESKTOP")).find("kde") != std::string::npos;
-    const auto kde = [&] { return kdeIsDark(config / "kdeglobals"); };
-    const auto first = isKde ? kde() : gtk();
-    return first ? first : isKde ? gtk() : kde();
-}
-
-bool isDark(ThemeChoice choice) {
-    if (choice != ThemeChoice::System) return choice == ThemeChoice::Dark;
-    const auto variable = [](const char* name) {
-        const char* value = std::getenv(name);
-        return std::string(value ? value : "");
-    };
-    const std::string home = variable("HOME"), config = variable("XDG_CONFIG_HOME");
-    return desktopIsDark(variable, config.empty() ? fs::path(home) / ".config" : fs::path(config)).value_or(true);
+bool isDark(ThemeChoice choice, std::optional<bool> desktop) {
+    return choice == ThemeChoice::System ? desktop.value_or(true) : choice == ThemeChoice::Dark;
 }
 
 }  // namespace vcp

@@ -1,12 +1,9 @@
-// How the window looks: colours of the light and the dark theme, and what the desktop prefers.
+// How the window looks: colours and sizes of the light and the dark theme.
 //
 // All sizes of the layout are in units of 8: a unit is a pixel at scale 1.
 #pragma once
 
-#include <filesystem>
-#include <functional>
 #include <optional>
-#include <string>
 #include <vector>
 
 #include <imgui.h>
@@ -60,12 +57,7 @@ Background backgroundOf(bool isDark);
 /// Quarters, from 1 to 4.
 float layoutScale(float display, int width, int height);
 
-/// Returns whether the desktop asks for dark windows: what GTK_THEME says; else the settings files of GTK 4, GTK 3 and
-/// KDE in `config`; else nothing. `variable` returns an environment variable, empty where it is not set. Files are
-/// read up to 64 KiB and may hold anything.
-std::optional<bool> desktopIsDark(const std::function<std::string(const char*)>& variable,
-                                  const std::filesystem::path& config);
-/// Returns whether windows are dark: as chosen, as the desktop of this process asks, or, where it does not say, dark.
-bool isDark(ThemeChoice choice);
+/// Returns whether windows are dark: as chosen, else as the desktop asks (desktop_theme.h), else dark.
+bool isDark(ThemeChoice choice, std::optional<bool> desktop);
 
 }  // namespace vcp

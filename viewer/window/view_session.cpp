@@ -462,7 +462,7 @@ void ViewSession::beginSaving(const PictureChoice& choice, std::filesystem::path
         options.cameras.push_back(camera.current());
         views.push_back(annotatedPicture(camera.current(), camera.viewHeight(), glm::uvec2(choice.size)));
     }
-    if (choice.annotated) options.paintOver = annotationPainter(annotations(), std::move(views), isDark(user_.theme));
+    if (choice.annotated) options.paintOver = annotationPainter(annotations(), std::move(views), isDark());
     auto pictures = std::make_unique<PictureSequence>(**view, std::move(options));
     saving_ = Saving{std::move(name), *std::move(view), std::move(pictures), isFolder};
 }
@@ -554,9 +554,18 @@ void ViewSession::setTheme(ThemeChoice theme) {
     useThemesBackground();
 }
 
+void ViewSession::followDesktop(std::optional<bool> isDark) {
+    if (desktopIsDark_ == isDark) return;
+    desktopIsDark_ = isDark;
+    noteChanges();
+    useThemesBackground();
+}
+
+bool ViewSession::isDark() const { return vcp::isDark(user_.theme, desktopIsDark_); }
+
 void ViewSession::useThemesBackground() {
     if (user_.hasBackground || changes_.backgroundTop || changes_.backgroundBottom) return;
-    const Background background = backgroundOf(isDark(user_.theme));
+    const Background background = backgroundOf(isDark());
     Shading shading = viewer_->shading();
     shading.backgroundTop = background.top;
     shading.backgroundBottom = background.bottom;

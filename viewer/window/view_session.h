@@ -70,6 +70,10 @@ public:
     void togglePanel();
     /// Chooses the theme; the background goes with it where none was chosen by hand.
     void setTheme(ThemeChoice theme);
+    /// Takes what the desktop asks for; nothing: it does not say.
+    void followDesktop(std::optional<bool> isDark);
+    /// Whether the window is dark.
+    [[nodiscard]] bool isDark() const;
     /// Keeps a size that was set by hand, not by the window system.
     void keepWindowSize(glm::ivec2 size) { changes_.windowSize = size; }
 
@@ -228,6 +232,7 @@ private:
 
     SessionOptions options_;
     UserSettings user_;
+    std::optional<bool> desktopIsDark_;
     SettingsChanges changes_;
     std::unique_ptr<Viewer> viewer_;
     Looks seenLooks_;  // as of the last update

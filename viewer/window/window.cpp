@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <cmath>
+#include <future>
 #include <map>
 #include <utility>
 
@@ -12,6 +13,7 @@
 
 #include "render/vulkan/library.h"
 #include "viewer/key_map.h"
+#include "viewer/window/desktop_theme.h"
 #include "viewer/window/interface.h"
 #include "viewer/window/interface_painter.h"
 #include "viewer/window/thumbnails.h"
@@ -21,6 +23,8 @@ namespace vcp {
 namespace {
 
 constexpr double kDoubleClickSeconds = 0.4;
+// An answer of the desktop that takes longer than the device's start comes later.
+constexpr std::chrono::milliseconds kThemeAwaited{200};
 constexpr double kClickPixels = 4;  // a press that moves less is a click
 
 Error displayError(const std::string& what) {
@@ -90,17 +94,33 @@ private:
     GLFWwindow* window_ = nullptr;
 };
 
+/// Asks the desktop whether windows are dark; the answer wakes the window.
+std::future<std::optional<bool>> questionToDesktop() {
+    return std::async(std::launch::async, [] {
+        const auto isDark = askDesktop();
+        glfwPostEmptyEvent();
+        return isDark;
+    });
+}
+
+template <class Value>
+bool isReady(const std::future<Value>& future, std::chrono::milliseconds most = {}) {
+    return future.wait_for(most) == std::future_status::ready;
+}
+
 /// The session in its window, which the callbacks reach.
 class ViewWindow {
 public:
     ViewWindow(const WindowSystem& system, ViewSession& session, std::unique_ptr<InterfacePainter> painter,
-               std::map<std::string, size_t> thumbnails, const WindowOptions& options)
+               std::map<std::string, size_t> thumbnails, std::future<std::optional<bool>> desktop,
+               const WindowOptions& options)
         : system_(&system),
           window_(system.window()),
           session_(&session),
           painter_(std::move(painter)),
           interface_(session, host(std::move(thumbnails))),
-          options_(&options) {
+          options_(&options),
+          desktop_(std::move(desktop)) {
         session.viewer().renderer().onDeviceLoss([this] { painter_.reset(); });
         glfwSetWindowUserPointer(window_, this);
         glfwSetFramebufferSizeCallback(window_, [](GLFWwindow* w, int x, int y) { of(w).resize({x, y}); });
@@ -112,7 +132,11 @@ public:
         glfwSetKeyCallback(window_,
                            [](GLFWwindow* w, int key, int, int action, int mods) { of(w).key(key, action, mods); });
         glfwSetCharCallback(window_, [](GLFWwindow* w, unsigned codepoint) { of(w).type(codepoint); });
-        glfwSetWindowFocusCallback(window_, [](GLFWwindow* w, int) { of(w).letGo(); });
+        glfwSetWindowFocusCallback(window_, [](GLFWwindow* w, int) {
+            of(w).letGo();
+            // The desktop's settings may have changed meanwhile.
+            if (!of(w).desktop_.valid()) of(w).desktop_ = questionToDesktop();
+        });
         glfwSetDropCallback(window_, [](GLFWwindow* w, int count, const char** paths) {
             of(w).open({paths, paths + count});
         });
@@ -192,7 +216,7 @@ private:
 
     /// How panels look in the window as it is.
     [[nodiscard]] InterfacePainter::Options painterOptions() const {
-        return {layoutScale(system_->contentScale(), framebuffer_.x, framebuffer_.y), isDark(session_->user().theme)};
+        return {layoutScale(system_->contentScale(), framebuffer_.x, framebuffer_.y), session_->isDark()};
     }
 
     /// Makes the painter anew, on the device that replaces a lost one.
@@ -419,8 +443,9 @@ private:
 
     /// Shows the last picture and the panels when either is new or the window was uncovered.
     Result<void> present(bool drawn) {
-        if (std::exchange(isRescaled_, false) || themeShown_ != session_->user().theme) {
-            themeShown_ = session_->user().theme;
+        if (desktop_.valid() && isReady(desktop_)) session_->followDesktop(desktop_.get());
+        if (std::exchange(isRescaled_, false) || darkShown_ != session_->isDark()) {
+            darkShown_ = session_->isDark();
             VCP_TRY(painter_->setOptions(painterOptions()));
         }
         layOut();
@@ -459,7 +484,8 @@ private:
     bool opensPage_ = false;  // the last key did: its character is not typed into the page
     glm::dvec3 held_{0};
     bool mustPresent_ = true, isRescaled_ = false;
-    ThemeChoice themeShown_ = ThemeChoice::System;
+    bool darkShown_ = true;
+    std::future<std::optional<bool>> desktop_;  ///< what it asks for, while it is asked
 };
 
 }  // namespace
@@ -470,7 +496,9 @@ Result<WindowReport> showWindow(const WindowOptions& options) {
     WindowSystem system;
     VCP_TRY(
         system.open(options.size.value_or(options.session.user.windowSize), inputs.empty() ? "vcp" : nameOf(inputs)));
+    std::future<std::optional<bool>> desktop = questionToDesktop();
     VCP_TRY_ASSIGN(auto session, ViewSession::create(options.session, system.surfaceSource()));
+    if (isReady(desktop, kThemeAwaited)) session->followDesktop(desktop.get());
     session->open(inputs);
     VCP_TRY_ASSIGN(const auto drawing, session->viewer().renderer().windowDrawing());
     // Only the welcome page shows thumbnails.
@@ -482,10 +510,10 @@ Result<WindowReport> showWindow(const WindowOptions& options) {
             thumbnails[file] = pictures.size();
             pictures.push_back(*std::move(picture));
         }
-    const InterfacePainter::Options look{layoutScale(system.contentScale(), 1 << 14, 1 << 14),
-                                         isDark(session->user().theme)};
+    const InterfacePainter::Options look{layoutScale(system.contentScale(), 1 << 14, 1 << 14), session->isDark()};
     VCP_TRY_ASSIGN(auto painter, InterfacePainter::create(drawing, look, std::move(pictures)));
-    return ViewWindow(system, *session, std::move(painter), std::move(thumbnails), options).run(start);
+    return ViewWindow(system, *session, std::move(painter), std::move(thumbnails), std::move(desktop), options)
+        .run(start);
 }
 
 }  // namespace vcp

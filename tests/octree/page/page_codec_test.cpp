@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <cstring>
+#include <functional>
 #include <random>
 
 #include <gtest/gtest.h>
@@ -22,7 +23,7 @@ namespace {
 using test::asBytes, test::Block, test::randomColours, test::sheet, test::soup, test::SoupPage, test::WholePage,
     test::withLeavesOfAllKinds;
 
-constexpr std::byte kPlain{0}, kCoded{1};
+constexpr std::byte kPlain{0}, kCoded{1}, kMarked{2};
 
 /// A vertex with all that belongs to it; triangles as sorted triples of them.
 using Vertex = std::array<uint32_t, 4>;
@@ -61,6 +62,7 @@ void expectSameNode(const PageView& a, uint32_t wordA, const PageView& b, uint32
     }
     if (nodeType(wordA) == kNodeSlab) {
         ASSERT_EQ(slabOctants(wordA), slabOctants(wordB));
+        ASSERT_EQ(isOpenSlab(wordA), isOpenSlab(wordB));
         ASSERT_EQ(vectorWord(a.faces, slabVector(wordA)), vectorWord(b.faces, slabVector(wordB)));
         if (!a.faceColours.empty()) {
             ASSERT_EQ(vectorWord(a.faceColours, slabVector(wordA)), vectorWord(b.faceColours, slabVector(wordB)));
@@ -265,6 +267,60 @@ TEST(PageCodec, PagesOfAnotherKindAreStoredPlainly) {
     expectRoundTrip(page, kPlain);
 }
 
+/// Gives open marks to vertices and slab leaves. `isOpen(number, position)`: of a vertex, and of a slab's vector.
+WholePage marked(WholePage page, const std::function<bool(uint32_t, glm::u32vec3)>& isOpen) {
+    const PageView view = page.view();
+    const PageSections s = pageSections(view.header);
+    auto* bytes = reinterpret_cast<std::byte*>(page.geometry.data());
+    auto* vertices = reinterpret_cast<glm::u32vec2*>(bytes + s.vertices);
+    auto* nodes = reinterpret_cast<uint32_t*>(bytes + s.nodes);
+    for (uint32_t v = 0; v < view.header.vertices; ++v)
+        if (isOpen(v, unpack21(vertices[v]))) vertices[v].y |= kVertexOpenBit;
+    for (uint32_t i = 0; i < 8 * view.header.groups; ++i)
+        if (nodeType(nodes[i]) == kNodeSlab && isOpen(slabVector(nodes[i]), {})) nodes[i] |= kSlabOpenBit;
+    return page;
+}
+
+TEST(PageCodec, OpenMarksComeBack) {
+    // Two sheets that share no vertex, of which one is open; and all kinds of leaves, every third slab open.
+    SoupPage two(3, 3);
+    for (int sheet = 0; sheet < 2; ++sheet)
+        for (int y = 0; y < 8; ++y)
+            for (int x = 0; x < 8; ++x) {
+                const auto vertex = [&](int i, int j) {
+                    return two.vertex({1800 * i + 300, 1800 * j + 300, 4000 + 5000 * sheet + 40 * i * j});
+                };
+                const uint32_t a = vertex(x, y), b = vertex(x + 1, y), c = vertex(x, y + 1);
+                two.triangle(a, b, c);
+            }
+    const WholePage unmarked = two.build(7);
+    const auto isHigh = [](uint32_t, glm::u32vec3 p) { return int(p.z) - kLatticeBias > 7500; };
+    const WholePage page = marked(unmarked, isHigh);
+    expectRoundTrip(page, kMarked);
+    expectRoundTrip(marked(sheet(1, 2, 3, 9).build(1), [](uint32_t, glm::u32vec3) { return true; }), kMarked);
+    const WholePage kinds =
+        marked(withLeavesOfAllKinds(soup(5, 2, 3, 20, 10).build(5), 5),
+               [](uint32_t number, glm::u32vec3 p) { return p == glm::u32vec3(0) && number % 3 == 0; });
+    expectRoundTrip(kinds, kMarked);
+    // The marks are in the bytes that come back, and all else is as without them.
+    const PackedPage packed = packPage(asBytes(page.geometry), {});
+    const WholePage back = unpack(packed, {page.geometry, {}});
+    uint32_t open = 0;
+    for (const glm::u32vec2 vertex : back.view().vertices) {
+        EXPECT_EQ(isOpenVertex(vertex), isHigh(0, unpack21(vertex)));
+        open += isOpenVertex(vertex) ? 1 : 0;
+    }
+    EXPECT_EQ(open, page.view().header.vertices / 2);
+    // A sheet of ever so many triangles has one mark.
+    const WholePage whole = sheet(1, 2, 3, 9).build(1);
+    const size_t without = packPage(asBytes(whole.geometry), {}).geometry.size();
+    const size_t with =
+        packPage(asBytes(marked(whole, [](uint32_t, glm::u32vec3) { return true; }).geometry), {}).geometry.size();
+    EXPECT_LE(with, without + 2);
+    // No triangle is open in a part.
+    expectRoundTrip(marked(unmarked, [](uint32_t number, glm::u32vec3) { return number % 2 == 0; }), kPlain);
+}
+
 TEST(PageCodec, SmoothSurfaceCostsLittle) {
     // A soft leaf of the sphere takes 20 to 25 bytes in memory; its vectors are foretold to a few steps.
     const WholePage page = analyticPage(test::sphere({15.2, 16.1, 15.7}, 12), 5, 2);
@@ -281,6 +337,8 @@ TEST(PageCodec, GoldenBytes) {
     EXPECT_EQ(hashBytes(a.geometry), 17991366014534821996u);
     EXPECT_EQ(hashBytes(b.geometry), 6557190735201215753u);
     EXPECT_EQ(hashBytes(b.colour), 14017639361795138587u);
+    const WholePage open = marked(hard, [](uint32_t, glm::u32vec3) { return true; });
+    EXPECT_EQ(hashBytes(packPage(asBytes(open.geometry), {}).geometry), 0u);
 }
 
 /// Decodes hostile bytes: refused, or of the size that was asked for.
@@ -309,7 +367,7 @@ TEST(PageCodec, EveryTruncationIsRefused) {
     longer.resize(longer.size() + 16, std::byte{1});
     EXPECT_FALSE(decodes(longer, packed.geometryBytes));
     // Sizes that are no page's, for both forms.
-    for (const std::byte form : {kPlain, kCoded})
+    for (const std::byte form : {kPlain, kCoded, kMarked})
         for (const uint64_t bytes : {0u, 1u, 8u, 63u, 72u, 1000u}) {
             std::vector<std::byte> other = packed.geometry;
             other[0] = form;
@@ -324,7 +382,8 @@ TEST(PageCodec, EveryTruncationIsRefused) {
 TEST(PageCodec, HostileBytesAreHarmless) {
     for (const WholePage& page :
          {sheet(3, 2, 3, 8).build(3), soup(4, 2, 4, 20, 25).build(4), analyticPage(test::sphere({4, 4, 4}, 3), 3, 0),
-          slabPage(test::sphere({4, 4, 4}, 3), 3), withLeavesOfAllKinds(soup(5, 2, 3, 20, 10).build(5), 5)}) {
+          slabPage(test::sphere({4, 4, 4}, 3), 3), withLeavesOfAllKinds(soup(5, 2, 3, 20, 10).build(5), 5),
+          marked(withLeavesOfAllKinds(sheet(6, 2, 3, 8).build(6), 6), [](uint32_t, glm::u32vec3) { return true; })}) {
         const PackedPage packed = packPage(asBytes(page.geometry), asBytes(page.colour));
         std::mt19937 random(11);
         for (int i = 0; i < 3000; ++i) {

@@ -1,4 +1,5 @@
 // What the window's panels are made of, without a window: theme, text, icons, file list, thumbnails, demo.
+#include <chrono>
 #include <fstream>
 #include <regex>
 
@@ -8,6 +9,7 @@
 #include "tests/support/test_folder.h"
 #include "viewer/window/controls.h"
 #include "viewer/window/demo_mesh.h"
+#include "viewer/window/desktop_theme.h"
 #include "viewer/window/file_list.h"
 #include "viewer/window/theme.h"
 #include "viewer/window/thumbnails.h"
@@ -30,8 +32,9 @@ protected:
                        : name == std::string("XDG_CURRENT_DESKTOP") ? desktop
                                                                     : std::string();
             },
-            folder_ / ".");
+            folder_ / ".", [this] { return portal_; });
     }
+    std::optional<bool> portal_;
 
     TestFolder folder_{"vcp_desktop_theme_test"};
 };
@@ -48,6 +51,35 @@ TEST_F(DesktopTheme, TheEnvironmentComesFirst) {
     EXPECT_EQ(isDark("Adwaita:dark"), true);
     EXPECT_EQ(isDark("Yaru-dark"), true);
     EXPECT_EQ(isDark("Adwaita"), false);
+    portal_ = true;
+    EXPECT_EQ(isDark("Adwaita"), false);
+}
+
+TEST_F(DesktopTheme, ThePortalComesBeforeFiles) {
+    write("gtk-4.0/settings.ini", "[Settings]\ngtk-application-prefer-dark-theme=0\n");
+    EXPECT_EQ(isDark(), false);
+    portal_ = true;
+    EXPECT_EQ(isDark(), true);
+}
+
+TEST(Portal, IsAskedByTheFirstProgramThatAnswers) {
+    using Calls = std::vector<ProgramCall>;
+    constexpr std::chrono::milliseconds kMost{20000};
+    EXPECT_EQ(portalIsDark({{"echo", "v v u 1"}}, kMost), true);
+    EXPECT_EQ(portalIsDark({{"echo", "v v u 2"}}, kMost), false);
+    EXPECT_EQ(portalIsDark({{"echo", "(<<uint32 1>>,)"}}, kMost), true);
+    EXPECT_EQ(portalIsDark({{"echo", "(<uint32 2>,)"}}, kMost), false);
+    EXPECT_EQ(portalIsDark({{"echo", "v v u 0"}, {"echo", "v v u 1"}}, kMost), std::nullopt) << "no preference";
+    EXPECT_EQ(portalIsDark({{"echo", "v v u 21"}}, kMost), std::nullopt);
+    const Calls failing{{"no-such-program"}, {"false"}, {"echo", "no number"}, {"yes"}};
+    EXPECT_EQ(portalIsDark(failing, kMost), std::nullopt);
+    Calls last = failing;
+    last.push_back({"echo", "v v u 1"});
+    EXPECT_EQ(portalIsDark(last, kMost), true);
+}
+
+TEST(Portal, WhatHangsIsKilled) {
+    EXPECT_EQ(portalIsDark({{"sleep", "1000"}, {"echo", "v v u 1"}}, std::chrono::milliseconds(50)), std::nullopt);
 }
 
 TEST_F(DesktopTheme, GtkSaysItByASwitchOrByItsThemesName) {
@@ -70,8 +102,11 @@ TEST_F(DesktopTheme, KdeSaysItByItsColours) {
 }
 
 TEST(Theme, AChoiceIsFollowed) {
-    EXPECT_TRUE(isDark(ThemeChoice::Dark));
-    EXPECT_FALSE(isDark(ThemeChoice::Light));
+    EXPECT_TRUE(isDark(ThemeChoice::Dark, false));
+    EXPECT_FALSE(isDark(ThemeChoice::Light, true));
+    EXPECT_TRUE(isDark(ThemeChoice::System, true));
+    EXPECT_FALSE(isDark(ThemeChoice::System, false));
+    EXPECT_TRUE(isDark(ThemeChoice::System, std::nullopt));
 }
 
 /// The ratio of luminances by which text is read (WCAG 2.1).
