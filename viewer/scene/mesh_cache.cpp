@@ -26,7 +26,7 @@ constexpr std::string_view kExtension = ".vcp";
 constexpr std::string_view kListExtension = ".files";
 
 // A part of the key: it is raised when the same options build other bytes.
-constexpr int kCacheGeneration = 4;
+constexpr int kCacheGeneration = 5;
 
 // An unfinished build older than this is abandoned.
 constexpr auto kLeftoverAge = std::chrono::hours(24);

@@ -98,17 +98,18 @@ Legend distanceLegend(double range, const std::string& from, const std::optional
     return legend;
 }
 
-Comparison::Comparison(Subject a, Subject b, SourceAccess access) {
+Comparison::Comparison(Subject a, Subject b, const Choice& choice, SourceAccess access) {
     access.cancelled = [this, others = access.cancelled] { return cancelled_ || (others && others()); };
-    coloured_ = std::async(std::launch::async, [this, a = std::move(a), b = std::move(b), access = std::move(access)] {
-        return caught(
-            [&]() -> Result<Coloured> {
-                VCP_TRY_ASSIGN(auto measured, measure(a, b, access));
-                const double range = measured->compared.range;
-                return colour(std::move(measured), range, {0.6, 1});
-            },
-            a.name);
-    });
+    coloured_ =
+        std::async(std::launch::async, [this, a = std::move(a), b = std::move(b), choice, access = std::move(access)] {
+            return caught(
+                [&]() -> Result<Coloured> {
+                    VCP_TRY_ASSIGN(auto measured, measure(a, b, choice, access));
+                    const double range = measured->compared.range;
+                    return colour(std::move(measured), range, {0.6, 1});
+                },
+                a.name);
+        });
 }
 
 Comparison::Comparison(std::shared_ptr<const Measured> measured, double range) {
@@ -156,6 +157,7 @@ Result<Comparison::Held> Comparison::load(const Subject& subject, const SourceAc
 }
 
 Result<std::shared_ptr<const Comparison::Measured>> Comparison::measure(const Subject& a, const Subject& b,
+                                                                        const Choice& choice,
                                                                         const SourceAccess& access) {
     auto measured = std::make_shared<Measured>();
     VCP_TRY_ASSIGN(auto first, load(a, access, {0, 0.1}));
@@ -163,11 +165,17 @@ Result<std::shared_ptr<const Comparison::Measured>> Comparison::measure(const Su
     measured->mesh = std::move(first.mesh);
     measured->diagonal = Box::of(measured->mesh.positions).diagonal();
     const DeviationTarget target(second.mesh);
-    VCP_TRY_ASSIGN(measured->deviation, measureDeviation(measured->mesh, target, {.progress = progress({0.3, 0.4})}));
+    const double within = choice.within * measured->diagonal;
+    VCP_TRY_ASSIGN(measured->deviation,
+                   measureDeviation(measured->mesh, target, {.within = within, .progress = progress({0.3, 0.4})}));
+    if (choice.both) {
+        VCP_TRY_ASSIGN(measured->back, measureDeviation(second.mesh, DeviationTarget(measured->mesh),
+                                                        {.within = within, .progress = progress({0.4, 0.5})}));
+    }
     // Colours are of vertices, so the large triangles of a drawing need more of them; figures do not.
     shortenEdges(measured->mesh, measured->diagonal / kEdgesADiagonal, kMostTriangles);
     VCP_TRY_ASSIGN(measured->distances,
-                   distancesOf(measured->mesh.positions, target, {.progress = progress({0.4, 0.6})}));
+                   distancesOf(measured->mesh.positions, target, {.within = within, .progress = progress({0.5, 0.6})}));
     measured->compared = {.a = a.name,
                           .b = b.name,
                           .unit = {},

@@ -10,6 +10,7 @@
 #include <atomic>
 #include <functional>
 #include <future>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -42,13 +43,21 @@ public:
         Similarity placement;
     };
 
+    /// What is asked besides.
+    struct Choice {
+        /// Points farther than this part of the first surface's diagonal from the second have no counterpart.
+        double within = std::numeric_limits<double>::infinity();
+        bool both = false;  ///< the second is measured from the first as well
+    };
+
     /// What was measured, in the world.
     struct Measured {
         IndexedMesh mesh;              ///< the first surface
         std::vector<float> distances;  ///< of its positions
         Deviation deviation;
-        ComparedSurfaces compared;  ///< with the usual range
-        double diagonal = 0;        ///< of the first surface
+        std::optional<Deviation> back;  ///< of the second surface from the first, where both were asked for
+        ComparedSurfaces compared;      ///< with the usual range
+        double diagonal = 0;            ///< of the first surface
     };
 
     struct Coloured {
@@ -58,7 +67,7 @@ public:
     };
 
     /// Begins to measure `a` from `b`, and to colour `a` with the usual range.
-    Comparison(Subject a, Subject b, SourceAccess access);
+    Comparison(Subject a, Subject b, const Choice& choice, SourceAccess access);
     /// Begins to colour what was measured with another range.
     Comparison(std::shared_ptr<const Measured> measured, double range);
     ~Comparison();
@@ -83,7 +92,8 @@ private:
 
     [[nodiscard]] std::function<bool(double)> progress(Stage stage);
     Result<Held> load(const Subject& subject, const SourceAccess& access, Stage stage);
-    Result<std::shared_ptr<const Measured>> measure(const Subject& a, const Subject& b, const SourceAccess& access);
+    Result<std::shared_ptr<const Measured>> measure(const Subject& a, const Subject& b, const Choice& choice,
+                                                    const SourceAccess& access);
     Result<Coloured> colour(std::shared_ptr<const Measured> measured, double range, Stage stage);
 
     std::atomic<double> fraction_ = 0;

@@ -90,6 +90,8 @@ private:
     void layOutPoints();
     void layOutCompare();
     void layOutCompared();
+    void layOutComparisonChoice();
+    void layOutDeviation(const Deviation& deviation);
     void drawDistances(const Deviation& deviation, double range) const;
     [[nodiscard]] bool canCompare() const;
     [[nodiscard]] std::vector<uint32_t> scansShownFirst() const;

@@ -1,6 +1,8 @@
 // The panel's section that compares: what with what, then figures, histogram and the range of the colours.
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
 
 #include <fmt/format.h>
 #include <imgui.h>
@@ -19,6 +21,17 @@ constexpr size_t kBars = 64;
 constexpr float kHistogramHeight = 72;
 // The range of the colours goes from a thousandth of the largest distance to all of it, by powers.
 constexpr double kLeastRange = 1e-3;
+
+/// How far from the other surface points may be, as parts of the diagonal.
+struct Within {
+    const char* name;
+    double part;
+};
+constexpr std::array<Within, 5> kWithin = {{{"All points", std::numeric_limits<double>::infinity()},
+                                            {"Points within 10 % of its size", 0.1},
+                                            {"Points within 3 % of its size", 0.03},
+                                            {"Points within 1 % of its size", 0.01},
+                                            {"Points within 0.1 % of its size", 0.001}}};
 
 ImU32 packed(glm::dvec3 colour) {
     const glm::dvec3 c = 255.0 * colour + 0.5;
@@ -63,6 +76,7 @@ void Interface::layOutCompare() {
     ImGui::PopStyleColor();
     const std::vector<uint32_t> scans = scansShownFirst();
     ImGui::BeginDisabled(session_->saving().has_value());
+    layOutComparisonChoice();
     if (scans.size() > 1) {
         const float room = ImGui::GetContentRegionAvail().x - units(64);
         std::vector<std::string> names;
@@ -84,6 +98,29 @@ void Interface::layOutCompare() {
                    -1, scans.size() == 1))
         chooseCompared(first);
     ImGui::EndDisabled();
+}
+
+void Interface::layOutComparisonChoice() {
+    Comparison::Choice& choice = session_->comparisonChoice;
+    std::array<const char*, kWithin.size()> names{};
+    std::ranges::transform(kWithin, names.begin(), &Within::name);
+    int chosen = int(std::ranges::find(kWithin, choice.within, &Within::part) - kWithin.begin());
+    if (comboRow(*look_, "##within", names, chosen,
+                 {"Points of the first that are farther from the second have no counterpart: they do not count", ""}))
+        choice.within = kWithin[size_t(chosen)].part;
+    switchRow(*look_, "Measure back", choice.both, {"Figures of the second from the first as well", ""});
+}
+
+/// Lists the figures of one surface from the other.
+void Interface::layOutDeviation(const Deviation& deviation) {
+    const auto& unit = session_->unit();
+    valueRow(*look_, "Mean", lengthText(deviation.mean, unit));
+    valueRow(*look_, "Root mean square", lengthText(deviation.rms, unit));
+    valueRow(*look_, "95 % are within", lengthText(deviation.absoluteQuantile(0.95), unit));
+    valueRow(*look_, "At most", lengthText(deviation.absoluteQuantile(1), unit));
+    valueRow(*look_, "Points measured", formatCount(deviation.samples));
+    if (deviation.withoutCounterpart() > 0)
+        valueRow(*look_, "Without a counterpart", formatCount(deviation.withoutCounterpart()));
 }
 
 void Interface::layOutCompared() {
@@ -108,13 +145,13 @@ void Interface::layOutCompared() {
     if (ImGui::IsItemDeactivatedAfterEdit()) session_->setComparisonRange(std::pow(10.0, double(rangeDragged_)) * most);
     ImGui::EndDisabled();
     showTip(*look_, {"The distance at both ends of the colours; they are made anew when it is let go", ""});
-    valueRow(*look_, "Mean", lengthText(deviation.mean, unit));
-    valueRow(*look_, "Root mean square", lengthText(deviation.rms, unit));
-    valueRow(*look_, "95 % are within", lengthText(deviation.absoluteQuantile(0.95), unit));
-    valueRow(*look_, "At most", lengthText(deviation.absoluteQuantile(1), unit));
+    layOutDeviation(deviation);
+    if (measured.back) {
+        caption(*look_, "And back");
+        layOutDeviation(*measured.back);
+    }
     if (const double certified = measured.compared.certifiedA + measured.compared.certifiedB; certified > 0)
         valueRow(*look_, "Each is within", "± " + lengthText(certified, unit));
-    valueRow(*look_, "Points measured", formatCount(deviation.samples));
     ImGui::BeginDisabled(session_->saving().has_value());
     const float half = (ImGui::GetContentRegionAvail().x - units(8)) / 2;
     if (textButton(*look_, icon::kExport, "Export", {"Write deviation-1.csv and .json", ""}, half))

@@ -171,6 +171,8 @@ public:
     /// meanwhile. Does nothing while something is saved or compared. A problem is reported, and changes nothing.
     void compare(uint32_t dataset, uint32_t with);
     void compareWithFile(uint32_t dataset, const std::string& file);
+    /// What compare() asks besides: a switch of the panel.
+    Comparison::Choice comparisonChoice;
     /// What is compared: the figures, and the colours that are shown.
     struct ShownComparison {
         uint32_t dataset = 0;

@@ -34,7 +34,7 @@ void ViewSession::beginComparing(uint32_t dataset, std::optional<uint32_t> with,
     comparing_ = std::make_unique<Comparison>(
         Comparison::Subject{
             .name = layers_[dataset].name, .reader = part.open.reader, .file = {}, .placement = part.placement},
-        std::move(other), options_.render.source);
+        std::move(other), comparisonChoice, options_.render.source);
 }
 
 void ViewSession::setComparisonRange(double range) {
@@ -111,7 +111,9 @@ void ViewSession::exportComparison() {
     const auto nameOf = [](int number) { return fmt::format("deviation-{}", number); };
     const std::string name =
         nameOf(freeNumber([&](int i) { return isThere(nameOf(i) + ".csv") || isThere(nameOf(i) + ".json"); }));
-    const std::string text = deviationJson(deviation, compared, "a_to_b").dump(2) + "\n";
+    auto figures = deviationJson(deviation, compared, "a_to_b");
+    if (const auto& back = compared_->shown.measured->back) figures.update(deviationJson(*back, compared, "b_to_a"));
+    const std::string text = figures.dump(2) + "\n";
     const auto table =
         writeFile(name + ".csv", OutputKind::Text, std::string_view(deviationCsv(deviation, compared.range)));
     const auto json = writeFile(name + ".json", OutputKind::JsonText, std::string_view(text));

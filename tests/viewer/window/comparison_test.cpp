@@ -3,10 +3,12 @@
 
 #include <algorithm>
 #include <fstream>
+#include <limits>
 
 #include <nlohmann/json.hpp>
 
 #include "octree/dataset_reader.h"
+#include "tests/support/test_meshes.h"
 #include "tests/support/viewed_ball.h"
 
 namespace vcp {
@@ -110,6 +112,33 @@ TEST_F(ComparisonTest, AFileIsComparedAndFiguresAreWritten) {
     EXPECT_TRUE(contentOf("deviation-1.csv").starts_with("quantity,from,to,value\nmean,,,"));
     EXPECT_EQ(filesIn("."),
               (std::set<std::string>{"deviation-1.csv", "deviation-1.json", "deviation-2.csv", "deviation-2.json"}));
+}
+
+// The scan of the ball, and a file of a ball and a far one: from it the scan has counterparts everywhere, but not back.
+TEST_F(ComparisonTest, BothWaysAndOnlyWhatIsNear) {
+    IndexedMesh two = test::sphereMesh({0, 0, 0}, 1, 24);
+    test::append(two, test::sphereMesh({20, 0, 0}, 1, 24));
+    test::writeObj(two, "two.obj");
+    const auto figures = [&](double within) {
+        session_->comparisonChoice = {.within = within, .both = true};
+        session_->compareWithFile(0, "two.obj");
+        EXPECT_TRUE(isCompared()) << session_->problem();
+        return session_->comparison()->measured;
+    };
+    const auto all = figures(std::numeric_limits<double>::infinity());
+    ASSERT_TRUE(all->back);
+    EXPECT_EQ(all->back->withoutCounterpart(), 0u);
+    EXPECT_GT(all->back->absoluteQuantile(1), 17);
+    const auto near = figures(1);
+    ASSERT_TRUE(near->back);
+    EXPECT_EQ(near->deviation.withoutCounterpart(), 0u);
+    EXPECT_LT(near->back->absoluteQuantile(1), 1);
+    // Half of the area is the far ball's.
+    EXPECT_NEAR(double(near->back->withoutCounterpart()) / double(near->back->samples), 0.5, 0.01);
+    session_->exportComparison();
+    const auto json = nlohmann::json::parse(contentOf("deviation-1.json"));
+    EXPECT_EQ(json["b_to_a"]["rms"], near->back->rms);
+    EXPECT_EQ(json["a_to_b"]["rms"], near->deviation.rms);
 }
 
 TEST_F(ComparisonTest, WhatCannotBeComparedIsSaidAndChangesNothing) {
