@@ -135,6 +135,11 @@ assert view.settle() and view.render()[0].shape == (64, 64, 4)' "of eight.vcp"
     done
 fi
 
+# The first steps of the documentation, with a mesh that was made of the octahedron.
+quietly vcp export "of eight.vcp" -o scan.ply
+LD_LIBRARY_PATH=$(dirname "$(find "$usr/lib" -name 'libvcp.so.?')") bash "$here/first_steps_test.sh" "$source/docs/first_steps.md" scan.ply \
+    "$work/steps" "$usr"
+
 # Removed, nothing is left.
 under --purge "${names[@]}"
 left=$(find "$root" -mindepth 1 -not -path "$root/var*")

@@ -8,7 +8,8 @@ for tool in Xvfb xdotool import convert; do
 done
 rm -rf "$folder"; mkdir -p "$folder"; cd "$folder"
 export XDG_CACHE_HOME=$folder/cache XDG_CONFIG_HOME=$folder/config
-unset GTK_THEME  # the dark theme, in which letters are lighter than what they stand on
+# The dark theme, in which letters are lighter than what they stand on.
+unset GTK_THEME DBUS_SESSION_BUS_ADDRESS XDG_RUNTIME_DIR
 
 fail() { echo "window_test: $*" >&2; cat log 2>/dev/null >&2; exit 1; }
 
@@ -225,6 +226,20 @@ if [ -n "$drop" ]; then
     waits_for "what was dropped is not shown" is_first dropped_picture
     ends 0
 fi
+
+# The desktop's portal says whether the window is light, also when that changes while it is open.
+mkdir programs
+printf '#!/bin/sh\n[ "$*" = "$(cat "%s/question")" ] && cat "%s/answer"\n' "$folder" "$folder" >programs/busctl
+echo "--user --timeout=1 call org.freedesktop.portal.Desktop /org/freedesktop/portal/desktop org.freedesktop.portal.Settings Read ss org.freedesktop.appearance color-scheme" >question
+chmod +x programs/busctl
+echo "v v u 2" >answer
+PATH=$folder/programs:$PATH DBUS_SESSION_BUS_ADDRESS=unix:path=/nowhere starts vcp --size 640x480 --samples 1
+bar_is() { is_at_rest bar && [ "$(convert bar.png -format "%[fx:p{200,8}.r$1]" info:)" = 1 ]; }
+waits_for "the bar is not light" bar_is '>0.9'
+echo "v v u 1" >answer
+xdotool windowfocus $window
+waits_for "the bar is not dark" bar_is '<0.2'
+ends 0
 
 # What cannot be opened is said in the window, which stays.
 head -c 3000 ball.ply >broken.ply
