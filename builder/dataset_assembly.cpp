@@ -53,14 +53,15 @@ void linkChildren(std::deque<PageSpool>& levels) {
     }
 }
 
-/// Tells of pages that only lead to finer ones what parts those have.
+/// Tells of pages that do not know it themselves what parts the pages below them have.
 void foldParts(std::deque<PageSpool>& levels) {
     for (size_t level = levels.size() - 1; level > 0; --level) {
         std::vector<PageEntry>& parents = levels[level - 1].entries();
         auto parent = parents.begin();
+        bool isKnown = parent->parts != 0;
         for (const PageEntry& page : levels[level].entries()) {
-            while (parent->morton != page.morton >> 3) ++parent;
-            if (parent->leaves == 0) parent->parts |= page.parts & (kPageHasClosed | kPageHasOpen);
+            for (; parent->morton != page.morton >> 3; isKnown = parent->parts != 0) ++parent;
+            if (!isKnown) parent->parts |= page.parts & (kPageHasClosed | kPageHasOpen);
         }
     }
 }

@@ -32,6 +32,8 @@ Result<BuiltPage> storedPage(const LevelSettings& settings, const LatticeMesh& m
                              std::span<const uint32_t> triangles) {
     const EncodedPage encoded = buildGeometry(settings, mesh, code, triangles);
     auto page = builtPage(settings, code, encoded);
+    // Clusters of coarser levels belong to no part.
+    if (page && !settings.finest) page->entry.parts = 0;
     if (page) return page;
     return Error{.code = ErrorCode::Limit,
                  .message = fmt::format(

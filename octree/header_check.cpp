@@ -78,6 +78,9 @@ private:
             return fail(offsetof(FileHeader, flags),
                         fmt::format("flags {:#x} are not known to this program: use a newer program", unknown),
                         ErrorCode::Unsupported);
+        constexpr uint32_t kMarked = kFlagParts | kFlagMarks;
+        if (h_.version >= kMarkedFileVersion && (h_.flags & kMarked) != kMarked)
+            return fail(offsetof(FileHeader, flags), "nothing in the flags asks for this version");
         return {};
     }
 
