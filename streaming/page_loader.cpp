@@ -14,6 +14,7 @@ namespace vcp {
 namespace {
 
 constexpr uint32_t kLongestRun = 64;
+constexpr uint32_t kMostSingleThreads = 16;  // of parts that have one thread each
 /// Pages are read together with a more urgent one where their urgency is at least this share of its own.
 constexpr double kRunUrgency = 0.5;
 
@@ -43,7 +44,12 @@ double steadySeconds() {
 
 PageLoader::PageLoader(std::shared_ptr<const PageSource> source, const LoaderOptions& options)
     : source_(std::move(source)), options_(options), queue_(options.retry), idle_(options.threads) {
-    for (uint32_t& threads : idle_) working_ += threads = std::max(threads, 1u);
+    uint32_t single = 0;
+    for (uint32_t& threads : idle_) {
+        threads = std::max(threads, 1u);
+        (threads == 1 ? single : working_) += threads;
+    }
+    working_ += std::min(single, kMostSingleThreads);
     shareMemory();
     const uint32_t threads = working_;
     while (threads_.size() < threads)

@@ -5,7 +5,8 @@
 // that fails is tried again after a while, and given up after a few attempts (request_queue.h); meanwhile the
 // threads read other pages. Pages that lie together and are about as urgent are read together where the source
 // says so. Each part of the source has so many threads and takes no more, so a part that is slow, or answers nothing at
-// all, keeps no other waiting.
+// all, keeps no other waiting. Of parts that have one thread each, 16 at most are read at a time: to decode a hundred
+// pages at once takes more memory than the pages have.
 //
 // No read begins while as many bytes are done as the next collect() would take: a moving view changes its wishes before
 // more could be of use, and what was read would be wasted.

@@ -6,6 +6,8 @@
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <glm/mat3x3.hpp>
+#include <glm/matrix.hpp>
 #include <glm/packing.hpp>
 
 #include "render/host/hit_light.h"
@@ -34,6 +36,35 @@ float skyAround(std::span<const float> depth, std::span<const uint8_t> sky, glm:
     return sum / std::max(count, 1.0f);
 }
 
+PixelBox pixelsOf(const HostScene& scene, const PictureRays& rays, glm::ivec2 size) {
+    // A point is origin + t direction + x (its step a pixel) + y (its step): of a pinhole with steps of the direction,
+    // which grow by t, else with steps of the origin.
+    const bool isParallel = rays.directionPerX == glm::dvec3(0) && rays.directionPerY == glm::dvec3(0);
+    const glm::dmat3 steps(isParallel ? rays.originPerX : rays.directionPerX,
+                           isParallel ? rays.originPerY : rays.directionPerY, rays.direction);
+    if (glm::determinant(steps) == 0) return {{0, 0}, size};
+    const glm::dmat3 toPixels = glm::inverse(steps);
+    constexpr double kMargin = 2;  // pixels: lines of cuts, and rounding
+    glm::dvec2 low(std::numeric_limits<double>::infinity()), high = -low;
+    for (uint32_t i = 0; i < scene.pages(); ++i) {
+        const HostScene::Page& page = scene.page(i);
+        const double cell = scene.grid().cell, edge = std::ldexp(cell, int(scene.grid().log2Cells + page.cellBits));
+        const glm::dvec3 lowest =
+            scene.grid().origin + glm::dvec3(page.corner) * std::ldexp(cell, -int(kMaxSubcellDepth)) - rays.origin;
+        for (int corner = 0; corner < 8; ++corner) {
+            const glm::dvec3 at = toPixels * (lowest + edge * glm::dvec3(corner & 1, corner >> 1 & 1, corner >> 2));
+            // What reaches behind the eye, or to it, may be seen anywhere.
+            if (!isParallel && !(at.z > 1e-9 * edge)) return {{0, 0}, size};
+            const glm::dvec2 pixel = isParallel ? glm::dvec2(at) : glm::dvec2(at) / at.z;
+            low = glm::min(low, pixel);
+            high = glm::max(high, pixel);
+        }
+    }
+    const glm::dvec2 largest(size);
+    return {glm::ivec2(glm::clamp(glm::floor(low - kMargin), glm::dvec2(0), largest)),
+            glm::ivec2(glm::clamp(glm::ceil(high + kMargin), glm::dvec2(0), largest))};
+}
+
 LayerTiles::LayerTiles(const HostLayer& layer, glm::ivec2 size)
     : layer_(layer),
       size_(size),
@@ -42,11 +73,14 @@ LayerTiles::LayerTiles(const HostLayer& layer, glm::ivec2 size)
       turn_(layer.frame.rotation.w, layer.frame.rotation.x, layer.frame.rotation.y, layer.frame.rotation.z),
       sections_(inCells(layer.rays.sections, layer.scene.grid().origin, layer.scene.grid().cell)),
       beginInEye_(sections_.empty() && layer.rays.originPerX == glm::dvec3(0) &&
-                  layer.rays.originPerY == glm::dvec3(0)) {
+                  layer.rays.originPerY == glm::dvec3(0)),
+      pixels_(pixelsOf(layer.scene, layer.rays, size)) {
     if (layer_.marks != nullptr && beginInEye_) markBegin({0, 0});
 }
 
 void LayerTiles::cast(TileHits& hits) const {
+    // Of many datasets most are elsewhere in the picture.
+    if (!pixels_.meets(hits.corner)) return;
     castTile(layer_.scene, layer_.rays, hits);
     if (layer_.caps != Caps::None) castCaps(layer_.scene, layer_.rays, layer_.caps, hits, cameraMarks());
     blendSlabs(layer_.scene, {layer_.frame.pixelEdge, layer_.frame.pixelEdgePerDepth}, hits);

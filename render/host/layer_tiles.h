@@ -31,6 +31,20 @@ void setAlbedo(TileSurface& surface, int i, glm::vec4 colour);
 float skyAround(std::span<const float> depth, std::span<const uint8_t> sky, glm::ivec2 size, glm::ivec2 pixel,
                 float reach);
 
+/// Pixels from `first` on, and none from `end` on.
+struct PixelBox {
+    glm::ivec2 first{0}, end{0};
+
+    /// Whether a tile has some of them. `corner`: its upper left pixel.
+    [[nodiscard]] bool meets(glm::ivec2 corner) const {
+        return corner.x < end.x && corner.y < end.y && corner.x + kTileWidth > first.x &&
+               corner.y + kTileHeight > first.y;
+    }
+};
+
+/// Returns the pixels of a picture of `size` in which the pages of a scene may be seen: no other ray meets their boxes.
+PixelBox pixelsOf(const HostScene& scene, const PictureRays& rays, glm::ivec2 size);
+
 class LayerTiles {
 public:
     /// `size`: of the picture.
@@ -84,6 +98,7 @@ private:
     const glm::quat turn_;
     const std::vector<SectionCut> sections_;  // finest cells from the root's lowest corner
     const bool beginInEye_;                   // all rays begin at one point
+    const PixelBox pixels_;                   // where something of it may be seen
 };
 
 }  // namespace vcp

@@ -5,6 +5,7 @@
 #include <unistd.h>
 #include <algorithm>
 #include <atomic>
+#include <filesystem>
 #include <set>
 
 #include <gtest/gtest.h>
@@ -161,6 +162,40 @@ TEST(PageLoader, APartThatAnswersNothingKeepsNoOtherWaiting) {
     EXPECT_EQ(begun.size(), 53u);
     pages->letGo();
     EXPECT_EQ(collectAll(loader, 50).size(), 50u);
+}
+
+/// Each page is a part of its own.
+class ManyParts final : public PageSource {
+public:
+    Result<PageBytes> read(Request request, bool withColour) const override { return pages_.read(request, withColour); }
+    [[nodiscard]] uint64_t bytesToRead(Request request, bool withColour) const override {
+        return pages_.bytesToRead(request, withColour);
+    }
+    [[nodiscard]] uint32_t partOf(Request request) const override { return uint32_t(request.number); }
+    void interrupt() const override { pages_.interrupt(); }
+
+private:
+    FakeSource pages_;
+};
+
+int threadsOfThis() {
+    const std::filesystem::directory_iterator tasks("/proc/self/task");
+    return int(std::distance(begin(tasks), end(tasks)));
+}
+
+TEST(PageLoader, AHundredPartsShareSixteenThreads) {
+    for (const bool hasWide : {false, true}) {
+        LoaderOptions hundred = options(false, 0, 1 << 20);
+        hundred.threads.assign(100, 1);
+        if (hasWide) hundred.threads[7] = 8;
+        const int before = threadsOfThis();
+        PageLoader loader(std::make_shared<ManyParts>(), hundred);
+        EXPECT_EQ(threadsOfThis() - before, hasWide ? 24 : 16);
+        std::vector<Wish> wishes;
+        for (uint64_t page = 0; page < 100; ++page) wishes.push_back({page, 1});
+        loader.request(wishes);
+        EXPECT_EQ(collectAll(loader, 100).size(), 100u);
+    }
 }
 
 TEST(PageLoader, ReadsNoFurtherThanTheNextUpdateTakesIn) {

@@ -7,6 +7,7 @@
 
 #include "render/camera.h"
 #include "render/host/hit_surface.h"
+#include "render/host/layer_tiles.h"
 #include "tests/support/built_mesh.h"
 #include "tests/support/instruction_sets.h"
 #include "tests/support/reference_comparison.h"
@@ -65,11 +66,17 @@ public:
         PictureRays rays = pictureRays(camera, kWidth, kHeight);
         rays.sections = sections_;
         const std::vector<HostPixel> pixels = castHost(scene_, rays);
+        const PixelBox seen = pixelsOf(scene_, rays, rays.size);
         Comparison c;
         for (uint32_t y = 0; y < kHeight; ++y)
             for (uint32_t x = 0; x < kWidth; ++x) {
                 const CameraRay ray = cameraRay(camera, kWidth, kHeight, x + 0.5, y + 0.5);
-                add(ray, pixels[size_t(y) * kWidth + x], c);
+                const HostPixel& pixel = pixels[size_t(y) * kWidth + x];
+                const bool isInside =
+                    int(x) >= seen.first.x && int(x) < seen.end.x && int(y) >= seen.first.y && int(y) < seen.end.y;
+                EXPECT_TRUE(isInside || std::isinf(pixel.depth))
+                    << "outside of where it may be seen: " << x << " " << y;
+                add(ray, pixel, c);
             }
         return c;
     }
@@ -241,6 +248,36 @@ TEST(HostCaster, NarrowTrianglesAndPoints) {
     const test::BuiltMesh built(test::randomTriangles(3000, 11, true), 0.05);
     ASSERT_TRUE(built.ok());
     expectSame(built.cache(), cutAtLevel(built.cache().dataset(), 99), glm::dvec3(0), glm::dvec3(1));
+}
+
+// Along -z upon the root's cube, whose near side spans the most pixels; and from inside of it, where all may be seen.
+TEST(HostCaster, WhereASceneMayBeSeen) {
+    const auto scene = test::torusScene();
+    const auto host = HostScene::create(*scene.cache, std::vector<uint64_t>{0});
+    ASSERT_TRUE(host);
+    const Dataset& dataset = *scene.dataset;
+    const glm::dvec3 origin = dataset.originOf(dataset.pages[0]);
+    const double edge = dataset.edgeOf(dataset.pages[0]);
+    const glm::ivec2 size(400, 400);
+    Camera camera;
+    camera.eye = origin + edge * glm::dvec3(0.5, 0.5, 5);
+    camera.forward = {0, 0, -1};
+    camera.up = {0, 1, 0};
+    camera.verticalFov = 2 * std::atan(0.5);
+    const PixelBox far = pixelsOf(*host, pictureRays(camera, 400, 400), size);
+    // Half an edge, four edges away, of a picture that is as high as the distance.
+    const double half = 200 * (0.5 / 4) / 0.5;
+    EXPECT_NEAR(far.first.x, 200 - half, 3);
+    EXPECT_NEAR(far.first.y, 200 - half, 3);
+    EXPECT_NEAR(far.end.x, 200 + half, 3);
+    EXPECT_NEAR(far.end.y, 200 + half, 3);
+    EXPECT_TRUE(far.meets({200, 200}));
+    EXPECT_FALSE(far.meets({0, 200}));
+    EXPECT_FALSE(far.meets({200, 384}));
+    camera.eye = origin + edge * glm::dvec3(0.5);
+    const PixelBox inside = pixelsOf(*host, pictureRays(camera, 400, 400), size);
+    EXPECT_EQ(inside.first, glm::ivec2(0));
+    EXPECT_EQ(inside.end, size);
 }
 
 TEST(HostCaster, StopsBetweenTiles) {
