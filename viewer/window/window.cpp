@@ -132,10 +132,10 @@ public:
         glfwSetKeyCallback(window_,
                            [](GLFWwindow* w, int key, int, int action, int mods) { of(w).key(key, action, mods); });
         glfwSetCharCallback(window_, [](GLFWwindow* w, unsigned codepoint) { of(w).type(codepoint); });
-        glfwSetWindowFocusCallback(window_, [](GLFWwindow* w, int) {
+        glfwSetWindowFocusCallback(window_, [](GLFWwindow* w, int hasFocus) {
             of(w).letGo();
             // The desktop's settings may have changed meanwhile.
-            if (!of(w).desktop_.valid()) of(w).desktop_ = questionToDesktop();
+            if (hasFocus == GLFW_TRUE && !of(w).desktop_.valid()) of(w).desktop_ = questionToDesktop();
         });
         glfwSetDropCallback(window_, [](GLFWwindow* w, int count, const char** paths) {
             of(w).open({paths, paths + count});
