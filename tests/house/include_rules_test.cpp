@@ -66,7 +66,7 @@ TEST(IncludeRules, NothingBelowTheRendererIncludesIt) {
 
 /// Messages name the thing, "the memory cap": the command line adds its option (viewer/command/option_names.h).
 TEST(IncludeRules, OnlyTheCommandLineNamesItsOptions) {
-    const std::regex option("\"[^\"]*--[a-z][^\"]*\"");
+    const std::regex option("\"[^\"]*--[a-z][^\"]*\""), ofOthers("\\{\"busctl\", ");
     size_t checked = 0;
     for (const Room& room : rooms()) {
         if (room.path.starts_with("viewer/command") || room.path == "viewer/examples" ||
@@ -79,7 +79,7 @@ TEST(IncludeRules, OnlyTheCommandLineNamesItsOptions) {
             std::istringstream lines(readText(entry.path()));
             for (std::string line; std::getline(lines, line);) {
                 line.erase(std::min(line.find("//"), line.size()));
-                EXPECT_FALSE(std::regex_search(line, option))
+                EXPECT_FALSE(std::regex_search(line, option) && !std::regex_search(line, ofOthers))
                     << fs::relative(entry.path(), kRoot).string() << ": " << line;
             }
         }

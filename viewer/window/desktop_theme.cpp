@@ -159,9 +159,9 @@ const std::vector<ProgramCall>& portalCalls() {
     static const std::vector<ProgramCall> kCalls{
         {"busctl", "--user", "--timeout=1", "call", "org.freedesktop.portal.Desktop", "/org/freedesktop/portal/desktop",
          "org.freedesktop.portal.Settings", "Read", "ss", "org.freedesktop.appearance", "color-scheme"},
-        {"gdbus", "call", "--session", "--timeout=1", "--dest=org.freedesktop.portal.Desktop",
-         "--object-path=/org/freedesktop/portal/desktop", "--method=org.freedesktop.portal.Settings.Read",
-         "org.freedesktop.appearance", "color-scheme"}};
+        {"gdbus", "call", "-e", "-t", "1", "-d", "org.freedesktop.portal.Desktop", "-o",
+         "/org/freedesktop/portal/desktop", "-m", "org.freedesktop.portal.Settings.Read", "org.freedesktop.appearance",
+         "color-scheme"}};
     return kCalls;
 }
 
