@@ -54,7 +54,7 @@ opens() {
     sleep 3
 }
 # closes: as by hand, so that thumbnails are kept.
-closes() { key ctrl+q; wait "$viewer" || true; }
+closes() { key ctrl+q 2>/dev/null || true; wait "$viewer" || true; }
 at() { xdotool mousemove --window "$window" "$@"; }
 away() { at 5 300; }
 key() { local k; for k; do xdotool key --window "$window" "$k"; sleep 0.3; done; }
