@@ -237,7 +237,8 @@ PATH=$folder/programs:$PATH DBUS_SESSION_BUS_ADDRESS=unix:path=/nowhere starts v
 bar_is() { is_at_rest bar && [ "$(convert bar.png -format "%[fx:p{200,8}.r$1]" info:)" = 1 ]; }
 waits_for "the bar is not light" bar_is '>0.9'
 echo "v v u 1" >answer
-xdotool windowfocus $window
+# Without a window manager a window has the focus until it is gone.
+xdotool windowunmap --sync $window windowmap --sync $window windowfocus $window
 waits_for "the bar is not dark" bar_is '<0.2'
 ends 0
 
