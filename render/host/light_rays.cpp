@@ -12,6 +12,7 @@
 #include <hwy/highway.h>
 
 #include "render/host/ray_stream-inl.h"
+#include "render/host/sun_tile-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace vcp::HWY_NAMESPACE {
@@ -21,8 +22,10 @@ void castLightRaysHere(const HostScene& scene, std::span<const LightRay> rays, f
     for (size_t i = 0; i < rays.size(); ++i)
         streams[SingleRay(rays[i].origin, rays[i].direction).nearest].push_back(uint32_t(i));
     RayStream stream(scene, marks);
-    for (const std::vector<uint32_t>& some : streams)
+    for (std::vector<uint32_t>& some : streams) {
+        if (areParallel(rays, some)) castParallel(scene, rays, some, distances, marks);
         if (!some.empty()) stream.cast(rays, some, distances);
+    }
 }
 
 }  // namespace vcp::HWY_NAMESPACE

@@ -16,9 +16,11 @@ constexpr int kGroupHeight = kLanes / kGroupWidth, kGroupRows = kTileHeight / kG
 constexpr int kGroups = kGroupColumns * kGroupRows;
 
 struct RayGroup {
-    Lane column, row;          // pixels from the tile's middle
-    Lane3 direction, inverse;  // no component is 0
-    Mask alive;                // rays of the picture without a hit
+    Lane column, row;               // pixels from the tile's middle
+    Lane3 direction, inverse;       // no component is 0
+    Lane begin, end;                // of rays that have spans: finest cells along them
+    float middleColumn, middleRow;  // of the rectangle that all are in
+    Mask alive;                     // rays of the picture without a hit
     // The hit: its distance in finest cells, multiplied with the direction, and what TileHits keeps.
     Lane t, x, y, z, side;
     Lane3 normal;
@@ -46,6 +48,19 @@ HWY_INLINE Lane invert(Lane& x) {
 HWY_INLINE Lane3 spread(glm::dvec3 v) { return {Lane(float(v.x)), Lane(float(v.y)), Lane(float(v.z))}; }
 HWY_INLINE Lane3 spread(glm::vec3 v) { return {Lane(v.x), Lane(v.y), Lane(v.z)}; }
 
+HWY_INLINE void setInverse(RayGroup& group) {
+    group.inverse.x = invert(group.direction.x);
+    group.inverse.y = invert(group.direction.y);
+    group.inverse.z = invert(group.direction.z);
+}
+
+HWY_INLINE void setNoHit(RayGroup& group) {
+    group.t = Lane(hwy::HighestValue<float>());
+    group.x = group.y = group.z = group.side = Lane(0.0f);
+    group.normal = Lane3(Lane(0.0f), Lane(0.0f), Lane(0.0f));
+    group.leaf = hn::Zero(Words());
+}
+
 /// Group `index` of a tile, its groups counted row by row. `size`: pixels of the tile that are in the picture.
 HWY_INLINE RayGroup rayGroup(const TileRays& rays, glm::ivec2 size, int index) {
     const int x = index % kGroupColumns * kGroupWidth, y = index / kGroupColumns * kGroupHeight;
@@ -61,19 +76,16 @@ HWY_INLINE RayGroup rayGroup(const TileRays& rays, glm::ivec2 size, int index) {
     group.row = row + Lane(kFirstRow);
     group.direction = mulAdd(group.column, spread(rays.directionPerX),
                              mulAdd(group.row, spread(rays.directionPerY), spread(rays.direction)));
-    group.inverse.x = invert(group.direction.x);
-    group.inverse.y = invert(group.direction.y);
-    group.inverse.z = invert(group.direction.z);
-    group.t = Lane(hwy::HighestValue<float>());
-    group.x = group.y = group.z = group.side = Lane(0.0f);
-    group.normal = Lane3(Lane(0.0f), Lane(0.0f), Lane(0.0f));
-    group.leaf = hn::Zero(Words());
+    setInverse(group);
+    group.middleColumn = kFirstColumn + float(x) + 0.5f * (kGroupWidth - 1);
+    group.middleRow = kFirstRow + float(y) + 0.5f * (kGroupHeight - 1);
+    setNoHit(group);
     return group;
 }
 
 /// What rays cannot miss by more than half a group: the reach of a number that is linear in the pixel's place.
-HWY_INLINE Lane reachInGroup(Lane perX, Lane perY) {
-    return mulAdd(abs(perX), Lane(0.5f * (kGroupWidth - 1)), abs(perY) * Lane(0.5f * (kGroupHeight - 1)));
+HWY_INLINE Lane reachInGroup(Lane perX, Lane perY, glm::vec2 half) {
+    return mulAdd(abs(perX), Lane(half.x), abs(perY) * Lane(half.y));
 }
 
 /// What section planes leave of rays.
@@ -91,7 +103,7 @@ struct GroupSegment {
     HWY_ATTR GroupSegment() {}
 };
 
-/// Returns what section planes leave of a segment.
+/// Returns what section planes, and the spans of rays, leave of a segment.
 inline HWY_NOINLINE GroupSegment cutSegment(const RayGroup& group, const LeafRays& leaf, GroupSegment s) {
     s.kept.end = Lane(hwy::HighestValue<float>());
     for (int i = 0; i < leaf.cutCount; ++i) {
@@ -101,6 +113,11 @@ inline HWY_NOINLINE GroupSegment cutSegment(const RayGroup& group, const LeafRay
         s.kept.begin = select(ahead, max(s.kept.begin, t), s.kept.begin);
         s.kept.end = select(back, min(s.kept.end, t), s.kept.end);
         s.kept.end = select(without(off > Lane(0.0f), ahead | back), Lane(hwy::LowestValue<float>()), s.kept.end);
+    }
+    if (leaf.hasSpans) {
+        const Lane perEdge(1.0f / leaf.edge), from(leaf.distance);
+        s.kept.begin = max(s.kept.begin, (group.begin - from) * perEdge);
+        s.kept.end = min(s.kept.end, (group.end - from) * perEdge);
     }
     s.first = max(s.first, s.kept.begin);
     s.inside = s.inside & (s.first <= min(s.last, s.kept.end));

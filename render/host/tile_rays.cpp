@@ -82,9 +82,10 @@ LeafRays leafRays(const TileRays& rays, glm::dvec3 lowest, double edge) {
     leaf.edge = float(edge);
     const auto largest = [](glm::vec3 v) { return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)}); };
     const float reach =
-        1 + largest(leaf.start) - kFirstColumn * largest(leaf.startPerX) - kFirstRow * largest(leaf.startPerY);
+        1 + largest(leaf.start) + rays.reach.x * largest(leaf.startPerX) + rays.reach.y * largest(leaf.startPerY);
     leaf.rounding = 0x1p-22f * reach;
     leaf.cutCount = 0;
+    leaf.hasSpans = rays.hasSpans;
     return leaf;
 }
 

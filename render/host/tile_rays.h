@@ -11,6 +11,9 @@
 
 namespace vcp {
 
+/// Where pixel 0 of a tile is, from its middle.
+inline constexpr float kFirstColumn = 0.5f - 0.5f * kTileWidth, kFirstRow = 0.5f - 0.5f * kTileHeight;
+
 /// The ray of the tile's pixel i columns and j rows from its middle begins at origin + i originPerX + j originPerY and
 /// runs along direction + i directionPerX + j directionPerY. The middle's direction has unit length.
 struct TileRays {
@@ -18,11 +21,14 @@ struct TileRays {
     glm::dvec3 direction, directionPerX, directionPerY;
     bool isParallel;
     std::vector<SectionCut> sections;  ///< finest cells, relative to the middle's origin
+    /// How far rays are from the middle, pixels.
+    glm::vec2 reach{-kFirstColumn, -kFirstRow};
+    /// How far rays of a group are at most from its middle, pixels; groups are kGroupWidth wide, and two rows high or
+    /// one.
+    glm::vec2 halfGroup{1.5f, 0.5f};
+    bool hasSpans = false;  ///< rays begin and end where RayGroup says
 };
 TileRays tileRays(const PictureRays& rays, const HostGrid& grid, glm::ivec2 corner);
-
-/// Where pixel 0 of a tile is, from its middle.
-inline constexpr float kFirstColumn = 0.5f - 0.5f * kTileWidth, kFirstRow = 0.5f - 0.5f * kTileHeight;
 
 /// Groups of rays are four pixels wide; how high they are depends on the machine.
 inline constexpr int kGroupWidth = 4, kGroupColumns = kTileWidth / kGroupWidth;
@@ -51,6 +57,7 @@ struct LeafRays {
     float edge;      ///< finest cells
     float rounding;  ///< of points on the rays within the leaf, leaf edges
     int cutCount;    ///< number of section planes that cut the leaf's box
+    bool hasSpans;   ///< as of TileRays
     glm::vec4 cuts[frame::kMaxSections];  ///< in leaf space: what has dot(xyz, p) >= w is kept
 };
 /// `lowest`: the leaf's lowest corner relative to the tile's origin, and `edge`: its edge, both in finest cells.

@@ -26,8 +26,9 @@ struct HardLeaf {
     glm::ivec3 corner;                  // lowest corner, steps of the page's lattice from the page's
     Lane3 start, startPerX, startPerY;  // of the rays, from that corner
     Lane3 direction, directionPerX, directionPerY;
-    Lane3 turnX, turnY;  // direction x startPerX, direction x startPerY
-    float slack;         // by so much triangles are widened
+    Lane3 turnX, turnY;   // direction x startPerX, direction x startPerY
+    float slack;          // by so much triangles are widened
+    glm::vec2 halfGroup;  // how far rays of a group are from its middle at most, pixels
 };
 
 HWY_INLINE HardLeaf hardLeaf(const TileRays& rays, const LeafRays& leaf, glm::ivec3 corner, float edge) {
@@ -41,6 +42,7 @@ HWY_INLINE HardLeaf hardLeaf(const TileRays& rays, const LeafRays& leaf, glm::iv
     h.directionPerY = spread(rays.directionPerY);
     h.turnX = cross(h.direction, h.startPerX);
     h.turnY = cross(h.direction, h.startPerY);
+    h.halfGroup = rays.halfGroup;
     h.slack = f32::kTriangleSlack + leaf.rounding * edge;
     return h;
 }
@@ -134,12 +136,12 @@ HWY_INLINE void setUpTriangles(const PageView& view, const HardLeaf& leaf, Trian
         const Lane slack = Lane(-leaf.slack) * length[k];
         t.volume[k].set(dot(leaf.direction, moment), perX, perY);
         store(slack, t.slack[k]);
-        store(Lane(2.0f) * slack - reachInGroup(perX, perY), t.lowest[k]);
+        store(Lane(2.0f) * slack - reachInGroup(perX, perY, leaf.halfGroup), t.lowest[k]);
     }
     const Lane3 n = cross(p[1] - p[0], p[2] - p[0]);
     const Lane perX = dot(n, leaf.directionPerX), perY = dot(n, leaf.directionPerY);
     t.along.set(dot(n, leaf.direction), perX, perY);
-    store(Lane(1.001f) * reachInGroup(perX, perY), t.reach);
+    store(Lane(1.001f) * reachInGroup(perX, perY, leaf.halfGroup), t.reach);
     t.height.set(dot(n, p[0] - leaf.start), -dot(n, leaf.startPerX), -dot(n, leaf.startPerY));
     store(Lane(kSteep) * length[1] * length[2], t.steep);
     t.haveNormals = false;
@@ -177,10 +179,9 @@ inline HWY_NOINLINE void setUpNormals(const PageView& view, Triangles& t) {
     t.haveNormals = true;
 }
 
-/// Returns which triangles a ray of group `index` may meet: bit i is triangle i.
-HWY_INLINE uint32_t trianglesMet(const Triangles& t, int index) {
-    const Lane column(kFirstColumn + float(index % kGroupColumns * kGroupWidth) + 0.5f * (kGroupWidth - 1));
-    const Lane row(kFirstRow + float(index / kGroupColumns * kGroupHeight) + 0.5f * (kGroupHeight - 1));
+/// Returns which triangles a ray of a group may meet: bit i is triangle i.
+HWY_INLINE uint32_t trianglesMet(const Triangles& t, const RayGroup& group) {
+    const Lane column(group.middleColumn), row(group.middleRow);
     const auto middle = [&](const LinearSums& sums) HWY_ATTR {
         return mulAdd(column, load(sums.perX), mulAdd(row, load(sums.perY), load(sums.middle)));
     };
