@@ -106,7 +106,7 @@ public:
             for (size_t k = 0; k < rays.size(); ++k) {
                 float distance = 0;
                 castLightRays(scene_, {&rays[k], 1}, &distance, &alone);
-                if (!isParallel) EXPECT_EQ(distances[k], distance) << "ray " << k;
+                EXPECT_TRUE(isParallel || distances[k] == distance) << "ray " << k;
                 add(rays[k], distances[k], found);
             }
             if (kind == Bundle::AlongGrid) continue;
@@ -161,7 +161,8 @@ void expectSame(const PageCache& cache, const std::vector<uint64_t>& cut, uint32
 TEST(LightRays, SoftLeavesOnEveryInstructionSet) {
     test::onEveryInstructionSet([] {
         const auto scene = test::torusScene();
-        for (const uint32_t level : {0u, 2u}) expectSame(*scene.cache, cutAtLevel(*scene.dataset, level), 7 + level);
+        for (const uint32_t level : {0u, 2u})
+            expectSame(*scene.cache, cutAtLevel(*scene.dataset, level), 7 + level, 80);
     });
 }
 
