@@ -58,7 +58,7 @@ void foldParts(std::deque<PageSpool>& levels) {
     for (size_t level = levels.size() - 1; level > 0; --level) {
         std::vector<PageEntry>& parents = levels[level - 1].entries();
         auto parent = parents.begin();
-        bool isKnown = parent->parts != 0;
+        bool isKnown = parent != parents.end() && parent->parts != 0;
         for (const PageEntry& page : levels[level].entries()) {
             for (; parent->morton != page.morton >> 3; isKnown = parent->parts != 0) ++parent;
             if (!isKnown) parent->parts |= page.parts & (kPageHasClosed | kPageHasOpen);

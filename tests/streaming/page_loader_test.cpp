@@ -5,8 +5,8 @@
 #include <unistd.h>
 #include <algorithm>
 #include <atomic>
-#include <filesystem>
 #include <set>
+#include <thread>
 
 #include <gtest/gtest.h>
 
@@ -26,6 +26,7 @@ public:
         {
             std::unique_lock lock(mutex_);
             begun_.push_back(page);
+            threads_.insert(std::this_thread::get_id());
             changed_.notify_all();
             changed_.wait(lock, [&] {
                 return !held_ && ((page != stalling && !(stallingOdd && page % 2 == 1)) || interrupted_);
@@ -55,6 +56,11 @@ public:
         const std::lock_guard lock(mutex_);
         return begun_;
     }
+    /// How many threads have read.
+    [[nodiscard]] size_t threads() const {
+        const std::lock_guard lock(mutex_);
+        return threads_.size();
+    }
 
     void interrupt() const override {
         const std::lock_guard lock(mutex_);
@@ -77,6 +83,7 @@ private:
     mutable std::mutex mutex_;
     mutable std::condition_variable changed_;
     mutable std::vector<uint64_t> begun_;
+    mutable std::set<std::thread::id> threads_;
     bool held_ = false;
     mutable bool interrupted_ = false;
 };
@@ -164,37 +171,40 @@ TEST(PageLoader, APartThatAnswersNothingKeepsNoOtherWaiting) {
     EXPECT_EQ(collectAll(loader, 50).size(), 50u);
 }
 
-/// Each page is a part of its own.
+/// A hundred parts, whose pages lie between one another's.
 class ManyParts final : public PageSource {
 public:
-    Result<PageBytes> read(Request request, bool withColour) const override { return pages_.read(request, withColour); }
-    [[nodiscard]] uint64_t bytesToRead(Request request, bool withColour) const override {
-        return pages_.bytesToRead(request, withColour);
+    explicit ManyParts(std::shared_ptr<const FakeSource> pages) : pages_(std::move(pages)) {}
+    Result<PageBytes> read(Request request, bool withColour) const override {
+        return pages_->read(request, withColour);
     }
-    [[nodiscard]] uint32_t partOf(Request request) const override { return uint32_t(request.number); }
-    void interrupt() const override { pages_.interrupt(); }
+    [[nodiscard]] uint64_t bytesToRead(Request request, bool withColour) const override {
+        return pages_->bytesToRead(request, withColour);
+    }
+    [[nodiscard]] uint32_t partOf(Request request) const override { return request.number % 100; }
+    void interrupt() const override { pages_->interrupt(); }
 
 private:
-    FakeSource pages_;
+    std::shared_ptr<const FakeSource> pages_;
 };
-
-int threadsOfThis() {
-    const std::filesystem::directory_iterator tasks("/proc/self/task");
-    return int(std::distance(begin(tasks), end(tasks)));
-}
 
 TEST(PageLoader, AHundredPartsShareSixteenThreads) {
     for (const bool hasWide : {false, true}) {
         LoaderOptions hundred = options(false, 0, 1 << 20);
         hundred.threads.assign(100, 1);
         if (hasWide) hundred.threads[7] = 8;
-        const int before = threadsOfThis();
-        PageLoader loader(std::make_shared<ManyParts>(), hundred);
-        EXPECT_EQ(threadsOfThis() - before, hasWide ? 24 : 16);
+        const size_t threads = hasWide ? 24 : 16;
+        const auto pages = std::make_shared<FakeSource>();
+        pages->hold(true);
+        PageLoader loader(std::make_shared<ManyParts>(pages), hundred);
         std::vector<Wish> wishes;
-        for (uint64_t page = 0; page < 100; ++page) wishes.push_back({page, 1});
+        for (uint64_t page = 0; page < 1000; ++page) wishes.push_back({page, 1});
         loader.request(wishes);
-        EXPECT_EQ(collectAll(loader, 100).size(), 100u);
+        pages->waitUntilBegun(threads);
+        EXPECT_EQ(pages->begun().size(), threads) << "each thread waits for one page";
+        pages->hold(false);
+        EXPECT_EQ(collectAll(loader, wishes.size()).size(), wishes.size());
+        EXPECT_EQ(pages->threads(), threads);
     }
 }
 
