@@ -129,14 +129,23 @@ TEST(ExactTree, MarksTheCellsThatAreTouched) {
     const Page page(mesh, {0, 0, 0});
     const PageTree tree = page.tree();
     const int n = tree.cells;
-    for (int z = 0; z < n; ++z)
-        for (int y = 0; y < n; ++y)
-            for (int x = 0; x < n; ++x) {
-                bool touched = false;
-                for (uint32_t k = 0; k < page.numbers.size() && !touched; ++k)
-                    touched = page.touches(k, tree, glm::i32vec3(x, y, z) * kLatticePerCell, kLatticePerCell);
-                ASSERT_EQ(tree.occupied[size_t(x + n * (y + n * z))] != 0, touched) << x << ' ' << y << ' ' << z;
-            }
+    std::vector<bool> touched(size_t(n) * n * n);
+    for (uint32_t k = 0; k < page.numbers.size(); ++k) {
+        // A cell beyond a triangle's box does not touch it.
+        const auto t = page.corners(k, tree);
+        const auto cellOf = [&](const glm::i32vec3& p, int beyond) {
+            return glm::clamp(p / kLatticePerCell + beyond, 0, n - 1);
+        };
+        const glm::i32vec3 low = cellOf(glm::min(t[0], glm::min(t[1], t[2])), -1);
+        const glm::i32vec3 high = cellOf(glm::max(t[0], glm::max(t[1], t[2])), 1);
+        for (int z = low.z; z <= high.z; ++z)
+            for (int y = low.y; y <= high.y; ++y)
+                for (int x = low.x; x <= high.x; ++x)
+                    if (page.touches(k, tree, glm::i32vec3(x, y, z) * kLatticePerCell, kLatticePerCell))
+                        touched[size_t(x + n * (y + n * z))] = true;
+    }
+    for (size_t cell = 0; cell < touched.size(); ++cell)
+        ASSERT_EQ(tree.occupied[cell] != 0, touched[cell]) << cell % n << ' ' << cell / n % n << ' ' << cell / n / n;
 }
 
 TEST(ExactTree, WallsOfLargeTrianglesHaveLargeLeaves) {
