@@ -1,5 +1,5 @@
-// Adaptive range coding: bits with adaptive probabilities (after Martin 1979 and the LZMA coder), symbols of up
-// to
+// Adaptive range coding: bits with adaptive probabilities (after Martin 1979 and the LZMA coder), symbols of up to
+// 16 values whose probabilities adapt as well, and raw bits, as they are, which are kept apart in bytes of their
 // own. Encoder and decoder have the same interface, so that a format is written down once, as a template over the
 // coder: `bit(model, value)` reads `value` in the one and sets it in the other. Integers alone decide, so every
 // machine decodes the same.
