@@ -181,7 +181,7 @@ public:
     [[nodiscard]] uint64_t bytesToRead(Request request, bool withColour) const override {
         return pages_->bytesToRead(request, withColour);
     }
-    [[nodiscard]] uint32_t partOf(Request request) const override { return request.number % 100; }
+    [[nodiscard]] uint32_t partOf(Request request) const override { return uint32_t(request.number % 100); }
     void interrupt() const override { pages_->interrupt(); }
 
 private:
