@@ -19,7 +19,7 @@ void forEachWord(Page& page, Visit&& visit) {
 }  // namespace
 
 bool PageDraft::hasMarks() const {
-    bool isMarked = std::ranges::any_of(vertices, isOpenVertex);
+    bool isMarked = std::any_of(vertices.begin(), vertices.end(), isOpenVertex);
     forEachWord(*this, [&](uint32_t word) { isMarked |= nodeType(word) == kNodeSlab && isOpenSlab(word); });
     return isMarked;
 }

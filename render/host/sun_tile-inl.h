@@ -175,8 +175,9 @@ constexpr float kMostGroupCells = 2;
 
 /// Whether rays run side by side, so many that a tile pays.
 inline HWY_NOINLINE bool areParallel(std::span<const LightRay> all, std::span<const uint32_t> some) {
-    return some.size() >= 2 * kLanes &&
-           std::ranges::all_of(some, [&](uint32_t ray) { return all[ray].direction == all[some[0]].direction; });
+    return some.size() >= 2 * kLanes && std::all_of(some.begin(), some.end(), [&](uint32_t ray) {
+               return all[ray].direction == all[some[0]].direction;
+           });
 }
 
 /// A group of rays across their direction: its middle and the square of its width, finest cells.
@@ -203,11 +204,13 @@ inline HWY_NOINLINE std::vector<uint32_t> takeCompact(std::span<const LightRay> 
     }
     std::vector<float> sorted;
     for (const Strip& strip : strips) sorted.push_back(strip.square);
-    std::ranges::sort(sorted);
+    std::sort(sorted.begin(), sorted.end());
     const float usual = sorted[sorted.size() / 4];
     std::vector<uint32_t> compact;
     if (usual > kMostGroupCells * kMostGroupCells) return compact;
-    const Strip& center = *std::ranges::find(strips, sorted[sorted.size() / 2], &Strip::square);
+    const float median = sorted[sorted.size() / 2];
+    const Strip& center =
+        *std::find_if(strips.begin(), strips.end(), [&](const Strip& strip) { return strip.square == median; });
     std::vector<uint32_t> others;
     for (size_t i = 0; i < some.size(); ++i) {
         const Strip& strip = strips[i / kLanes];
