@@ -80,9 +80,9 @@ Result<void> EntryCheck::colour(uint64_t index, const PageEntry& e) {
 }
 
 Result<void> EntryCheck::extent(uint64_t index, uint64_t offset, uint64_t stored, uint64_t bytes) {
-    const uint64_t fileBytes = header_.fileBytes - sizeof(CommitRecord);
-    if (offset < end_ || offset % kPageAlignment != 0 || stored == 0 || stored > fileBytes ||
-        offset > fileBytes - stored)
+    const bool hasImages = (header_.flags & kFlagImages) != 0;
+    const uint64_t pagesEnd = hasImages ? header_.images.offset : header_.fileBytes - sizeof(CommitRecord);
+    if (offset < end_ || offset % kPageAlignment != 0 || stored == 0 || stored > pagesEnd || offset > pagesEnd - stored)
         return brokenEntry(file_, index, "page lies outside the file or overlaps another");
     if (bytes == 0 || bytes > kMaxPageBytes || bytes % 16 != 0)
         return brokenEntry(file_, index, "page size out of range");

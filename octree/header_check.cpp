@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "octree/image/image_tables.h"
 #include "octree/io/content_hash.h"
 
 namespace vcp {
@@ -35,6 +36,7 @@ public:
         VCP_TRY(errors());
         VCP_TRY(counts());
         VCP_TRY(paper());
+        VCP_TRY(images());
         return rest();
     }
 
@@ -73,15 +75,26 @@ private:
             return fail(128, "a file of this method has one page");
         const uint32_t unknown =
             h_.flags & ~(kFlagColour | (h_.version > 3 ? kFlagCovering : 0) | (h_.version > 5 ? kFlagParts : 0) |
-                         (h_.version >= kMarkedFileVersion ? kFlagMarks : 0));
+                         (h_.version >= kMarkedFileVersion ? kFlagMarks : 0) |
+                         (h_.version >= kImagesFileVersion ? kFlagImages : 0));
         if (unknown != 0)
             return fail(offsetof(FileHeader, flags),
                         fmt::format("flags {:#x} are not known to this program: use a newer program", unknown),
                         ErrorCode::Unsupported);
-        constexpr uint32_t kMarked = kFlagParts | kFlagMarks;
-        if (h_.version >= kMarkedFileVersion && (h_.flags & kMarked) != kMarked)
-            return fail(offsetof(FileHeader, flags), "nothing in the flags asks for this version");
+        // Each version above the usual one is of files that have what it is for.
+        const auto has = [this](uint32_t flags) { return (h_.flags & flags) == flags; };
+        const bool isAskedFor = h_.version == kImagesFileVersion   ? has(kFlagColour | kFlagParts | kFlagImages)
+                                : h_.version == kMarkedFileVersion ? has(kFlagParts | kFlagMarks)
+                                                                   : true;
+        if (!isAskedFor) return fail(offsetof(FileHeader, flags), "nothing in the flags asks for this version");
         return {};
+    }
+
+    [[nodiscard]] Result<void> images() const {
+        if ((h_.flags & kFlagImages) == 0) return {};
+        const std::string wrong =
+            wrongPlace(h_.images, blockOffset(blocksOf(h_.pages)), h_.fileBytes - sizeof(CommitRecord));
+        return wrong.empty() ? Result<void>() : fail(offsetof(FileHeader, images), wrong);
     }
 
     [[nodiscard]] Result<void> sizes() const {
@@ -167,10 +180,10 @@ private:
     /// Checks that bytes without a meaning are zero, so that a later version may give them one.
     [[nodiscard]] Result<void> rest() const {
         VCP_TRY(zero(byteOf(h_.levels), offsetof(FileHeader, hash), "rows behind the level table"));
-        const bool hasParts = (h_.flags & kFlagParts) != 0;
+        const bool hasParts = (h_.flags & kFlagParts) != 0, hasImages = (h_.flags & kFlagImages) != 0;
         VCP_TRY(zero(offsetof(FileHeader, paper) + (isPaper_ ? offsetof(PaperParameters, reserved) : 0),
                      hasParts ? offsetof(FileHeader, parts) : kDirectoryOffset, "reserved bytes"));
-        return zero(sizeof(FileHeader), kDirectoryOffset, "reserved bytes");
+        return zero(hasImages ? sizeof(FileHeader) : offsetof(FileHeader, images), kDirectoryOffset, "reserved bytes");
     }
 
     [[nodiscard]] Result<void> zero(uint64_t begin, uint64_t end, const char* what) const {

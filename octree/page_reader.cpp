@@ -81,12 +81,18 @@ Result<PageBytes> readPage(const ByteReader& reader, const Dataset& dataset, uin
     if (!withColour || e.colourBytes == 0) return page;
     VCP_TRY_ASSIGN(const auto storedColour,
                    readStored(reader, element + " colour", e.colourOffset, e.colourStoredBytes, e.colourHash));
-    if (e.colourBytes != colourPageBytes(view->header))
+    const bool hasPoints = e.colourBytes != colourPageBytes(view->header);
+    if (hasPoints && (!dataset.hasImages() || e.colourBytes != texturedPageBytes(view->header)))
         return brokenBytes(reader.name(), element + " colour", e.colourOffset,
                            "colour page does not decode to its page's size");
     auto colour = unpackColour(storedColour, e.colourBytes, *view);
     if (!colour) return brokenBytes(reader.name(), element + " colour", e.colourOffset, colour.error().message);
     page.colour = *std::move(colour);
+    if (!hasPoints) return page;
+    for (const TexturePoint& point : viewOfChecked(page.geometryBytes(), page.colourBytes()).points)
+        if (point.material > dataset.header.images.materials)
+            return brokenBytes(reader.name(), element + " colour", e.colourOffset,
+                               "a triangle names a material that there is not");
     return page;
 }
 

@@ -1,6 +1,6 @@
-// The .vcp file, version 6, or 7 where pages have open marks. Files of versions 3 to 5 are read, too: they say nothing
-// of parts; those of versions 3 and 4 have all pages without children on the finest level; those of version 3 have no
-// slab leaves and no kFlagCovering.
+// The .vcp file, version 6; 7 where pages have open marks, and 8 where there are images. Files of versions 3 to 5 are
+// read, too: they say nothing of parts; those of versions 3 and 4 have all pages without children on the finest level;
+// those of version 3 have no slab leaves and no kFlagCovering.
 //
 // Pages without children hold the finest surface. Most are of the finest level; where triangles are few, they are of
 // coarser ones.
@@ -12,6 +12,7 @@
 //                         within the first 16 KiB
 //   ...                   pages, in the order of the directory, each on 256 bytes: geometry, then colour;
 //                         each as octree/page/page_codec.h says; zero bytes between
+//   ...                   with kFlagImages: the section of images, on 256 bytes (octree/image/image_tables.h)
 //   end-64   64           CommitRecord, written last
 //
 // Every header, block and page carries an XXH3-64; a file whose commit record, header or size disagree was
@@ -26,13 +27,15 @@
 #include <cstdint>
 #include <iterator>
 
+#include "octree/image/images_place.h"
 #include "octree/page/paper_page.h"
 
 namespace vcp {
 
 inline constexpr uint32_t kFileVersion = 6;
 inline constexpr uint32_t kMarkedFileVersion = 7;                          ///< with kFlagMarks
-inline constexpr uint32_t kOldestFileVersion = 3, kNewestFileVersion = 7;  ///< that are read
+inline constexpr uint32_t kImagesFileVersion = 8;                          ///< with kFlagImages
+inline constexpr uint32_t kOldestFileVersion = 3, kNewestFileVersion = 8;  ///< that are read
 inline constexpr uint32_t kMaxLevels = 22;                                 ///< Morton codes have 21 bits an axis
 inline constexpr uint32_t kMaxPaperLog2Cells = 20;
 inline constexpr uint64_t kDirectoryOffset = 4096;
@@ -74,7 +77,7 @@ struct FileHeader {
     uint32_t levels = 0;  ///< 1 to kMaxLevels
     uint32_t log2Cells =
         0;               ///< cells an edge of a page: 2^log2Cells; 1 to 7, of the method Paper to kMaxPaperLog2Cells
-    uint32_t flags = 0;  ///< kFlagColour, kFlagCovering, kFlagParts, kFlagMarks
+    uint32_t flags = 0;  ///< kFlagColour, kFlagCovering, kFlagParts, kFlagMarks, kFlagImages
     Method method = Method::Certified;
     uint64_t triangles = 0, degenerateTriangles = 0, vertices = 0;
     uint64_t leaves = 0;      ///< soft, slab and hard leaves of the pages without children
@@ -86,6 +89,7 @@ struct FileHeader {
     // triangles. Positions are as the finest level has them.
     uint64_t parts = 0, closedParts = 0;
     uint64_t openEdges = 0;  ///< edges with an odd number of triangles
+    ImagesPlace images;      ///< with kFlagImages
 };
 inline constexpr uint32_t kFlagColour = 1;
 /// The surface of each page covers the mesh's within the page: no ray through the mesh slips between pages of two
@@ -97,6 +101,9 @@ inline constexpr uint32_t kFlagParts = 4;
 /// With kFlagParts: some pages have open marks (octree/shared/page_layout.h), and their entries say so.
 inline constexpr uint32_t kFlagMarks = 8;
 
+/// With kFlagColour: triangles of the finest level may have texture coordinates and a material (octree/page/page.h).
+inline constexpr uint32_t kFlagImages = 16;
+
 /// What PageEntry::parts is made of. kPageHasMarks: with both others only; marks tell which surface is whose.
 inline constexpr uint8_t kPageHasClosed = 1, kPageHasOpen = 2, kPageHasMarks = 4;
 
@@ -107,7 +114,8 @@ constexpr bool isKnownVersion(uint32_t version) {
 static_assert(offsetof(FileHeader, origin) == 32 && offsetof(FileHeader, levels) == 128 &&
               offsetof(FileHeader, triangles) == 144);
 static_assert(offsetof(FileHeader, level) == 184 && offsetof(FileHeader, hash) == 184 + 24 * kMaxLevels &&
-              sizeof(FileHeader) == 184 + 24 * kMaxLevels + 8 + 32 + 24);
+              offsetof(FileHeader, images) == 184 + 24 * kMaxLevels + 8 + 32 + 24 &&
+              sizeof(FileHeader) == offsetof(FileHeader, images) + 32);
 
 /// One page in the directory.
 struct PageEntry {

@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "octree/image/image_tables.h"
 #include "octree/page_reader.h"
 
 namespace vcp {
@@ -68,6 +69,8 @@ public:
     }
 
     [[nodiscard]] uint64_t done() const { return end_; }
+    /// What lies before `end` was checked elsewhere.
+    void skipTo(uint64_t end) { end_ = end; }
 
 private:
     [[nodiscard]] Error broken(std::string element, uint64_t byte, std::string message) const {
@@ -105,6 +108,13 @@ Result<void> verifyFile(const ByteReader& reader, bool (*progress)(void*, uint64
     for (uint64_t i = 0; i < dataset.pages.size(); ++i) {
         VCP_TRY(verification.page(i));
         if (progress != nullptr && !progress(user, verification.done())) return Error::cancelled(reader.name());
+    }
+    if (dataset.hasImages()) {
+        const ImagesPlace& place = dataset.header.images;
+        VCP_TRY(verification.gap(place.offset));
+        VCP_TRY(
+            verifyImages(reader, place, [&](uint64_t done) { return progress == nullptr || progress(user, done); }));
+        verification.skipTo(place.offset + place.bytes);
     }
     return verification.gap(reader.size() - sizeof(CommitRecord));
 }

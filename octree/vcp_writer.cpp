@@ -59,6 +59,27 @@ Result<void> VcpWriter::append(PageEntry entry, const StoredPage& page) {
     return {};
 }
 
+Result<void> VcpWriter::beginImages(ImageTables tables) {
+    images_ = {
+        .offset = end_, .images = uint32_t(tables.images.size()), .materials = uint32_t(tables.materials.size())};
+    images_.bytes = tables.bytes();
+    for (TileRow& tile : tables.tiles) {
+        tile.offset = images_.offset + images_.bytes;
+        images_.bytes += tile.storedBytes;
+    }
+    const std::vector<std::byte> stored = tables.stored();
+    images_.hash = hashBytes(stored);
+    VCP_TRY(file_.write(end_, stored));
+    end_ += stored.size();
+    return {};
+}
+
+Result<void> VcpWriter::appendTile(std::span<const std::byte> stored) {
+    VCP_TRY(file_.write(end_, stored));
+    end_ += stored.size();
+    return {};
+}
+
 Result<uint64_t> VcpWriter::commit(FileHeader header) {
     std::vector<std::byte> directory(directoryBytes(pages_));
     for (size_t i = 0; i < entries_.size(); ++i) {
@@ -74,6 +95,11 @@ Result<uint64_t> VcpWriter::commit(FileHeader header) {
     if (std::ranges::any_of(entries_, [](const PageEntry& e) { return (e.parts & kPageHasMarks) != 0; })) {
         header.version = kMarkedFileVersion;
         header.flags |= kFlagMarks;
+    }
+    if (images_.images > 0) {
+        header.version = kImagesFileVersion;
+        header.flags |= kFlagImages;
+        header.images = images_;
     }
     header.pages = pages_;
     header.fileBytes = end_ + sizeof(CommitRecord);

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <memory>
 
+#include "octree/image/image_tables.h"
 #include "octree/io/output_file.h"
 #include "octree/io/result.h"
 #include "octree/page/page_draft.h"
@@ -37,6 +38,12 @@ public:
     /// the rest). Errors: Io.
     Result<void> append(PageEntry entry, const StoredPage& page);
 
+    /// Writes the tables of the images behind the pages that were appended. `tables`: without the tiles' offsets; their
+    /// hashes and sizes are known. The tiles follow, by appendTile. Errors: Io.
+    Result<void> beginImages(ImageTables tables);
+    /// Appends the stored bytes of the next tile of the table. Errors: Io.
+    Result<void> appendTile(std::span<const std::byte> stored);
+
     /// Writes header, directory and commit record, makes the file durable and gives it its name. The caller
     /// fills the header but for sizes, version, flags of the layout and hashes. Returns the file's bytes. Errors: Io.
     Result<uint64_t> commit(FileHeader header);
@@ -48,6 +55,7 @@ private:
     uint64_t end_;
     uint64_t pages_;
     std::vector<PageEntry> entries_;
+    ImagesPlace images_;
 };
 
 }  // namespace vcp

@@ -137,6 +137,10 @@ PageSections pageSections(const PageHeader& h) {
 
 uint64_t colourPageBytes(const PageHeader& h) { return align16(uint64_t{16} * h.faces + uint64_t{4} * h.vertices); }
 
+uint64_t texturedPageBytes(const PageHeader& h) {
+    return uint64_t{16} * h.faces + uint64_t{4 + sizeof(TexturePoint)} * h.vertices;
+}
+
 PageView viewOfChecked(std::span<const std::byte> bytes, std::span<const std::byte> colours) {
     PageView page;
     std::memcpy(&page.header, bytes.data(), sizeof(PageHeader));
@@ -151,6 +155,9 @@ PageView viewOfChecked(std::span<const std::byte> bytes, std::span<const std::by
     if (!colours.empty()) {
         page.faceColours = section<uint4>(colours, 0, h.faces);
         page.vertexColours = section<uint32_t>(colours, uint64_t{16} * h.faces, h.vertices);
+        // A triangle's page has three vertices at least, and then the sizes differ.
+        if (colours.size() != colourPageBytes(h))
+            page.points = section<TexturePoint>(colours, uint64_t{16} * h.faces + uint64_t{4} * h.vertices, h.vertices);
     }
     return page;
 }
@@ -160,7 +167,7 @@ Result<PageView> parsePage(std::span<const std::byte> bytes, std::span<const std
     PageHeader header;
     std::memcpy(&header, bytes.data(), sizeof(PageHeader));
     VCP_TRY(checkHeader(header, bytes.size()));
-    if (!colours.empty() && colours.size() != colourPageBytes(header))
+    if (!colours.empty() && colours.size() != colourPageBytes(header) && colours.size() != texturedPageBytes(header))
         return broken(0, "colour page does not match its page");
     const PageView page = viewOfChecked(bytes, colours);
     VCP_TRY(NodeCheck(page).run());

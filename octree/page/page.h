@@ -43,8 +43,19 @@ struct PageSections {
 };
 PageSections pageSections(const PageHeader& header);
 
-/// Returns the bytes of the colour page that belongs to a page.
+/// Where a vertex of a hard leaf's triangles is in an image. All three vertices of a triangle have the same material.
+struct TexturePoint {
+    int32_t u = 0, v = 0;   ///< in 1/65536 of the image's width and height; (0, 0): its upper left corner, v downwards
+    uint32_t material = 0;  ///< number of the material (octree/image/image_tables.h) plus 1; 0: none, u and v are 0
+
+    bool operator==(const TexturePoint&) const = default;
+};
+static_assert(sizeof(TexturePoint) == 12);
+inline constexpr double kTextureUnit = 1.0 / 65536;
+
+/// Returns the bytes of the colour page that belongs to a page; of one that has a TexturePoint for each vertex, too.
 uint64_t colourPageBytes(const PageHeader& header);
+uint64_t texturedPageBytes(const PageHeader& header);
 
 /// Copies items to where a section of a page, or of its colours, begins.
 template <class T>
@@ -62,11 +73,13 @@ struct PageView {
     StripEntries strips;
     std::span<const uint4> faceColours;       ///< empty without colour
     std::span<const uint32_t> vertexColours;  ///< empty without colour
+    std::span<const TexturePoint> points;     ///< of the vertices; empty where no triangle has an image
 };
 
 /// Checks every word of a page, so that a traversal cannot leave it or loop: counts against the size, nodes
 /// form a tree of bounded depth, leaves and indices are in range. `bytes` must be 16-byte aligned; may be
-/// hostile. `colours` is empty or a colour page. Errors: InvalidInput, with the byte within the page.
+/// hostile. `colours` is empty or a colour page, with points
+/// or without; whether the file has their materials is not known here. Errors: InvalidInput, with the byte within the page.
 Result<PageView> parsePage(std::span<const std::byte> bytes, std::span<const std::byte> colours = {});
 
 /// Returns the view of a page that parsePage has accepted before, wherever its bytes lie now; checks nothing. `colours`

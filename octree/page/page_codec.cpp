@@ -11,13 +11,14 @@
 #include "octree/page/face_codec.h"
 #include "octree/page/mesh_codec.h"
 #include "octree/page/node_codec.h"
+#include "octree/page/point_codec.h"
 #include "octree/page/slab_codec.h"
 
 namespace vcp {
 
 namespace {
 
-constexpr std::byte kPlain{0}, kCoded{1}, kMarked{2};
+constexpr std::byte kPlain{0}, kCoded{1}, kMarked{2}, kTextured{3};
 constexpr int kPlainLevel = 3;
 
 Error broken(std::string message) { return {.code = ErrorCode::InvalidInput, .message = std::move(message)}; }
@@ -73,6 +74,12 @@ void codePage(Coder& coder, CodecPage& page) {
     if (!page.wrong) page.finish();
 }
 
+/// The points in a colour page that has them.
+std::span<TexturePoint> pointsIn(std::span<uint4> block, const PageHeader& header) {
+    auto* vertices = reinterpret_cast<uint32_t*>(block.data() + header.faces);
+    return {reinterpret_cast<TexturePoint*>(vertices + header.vertices), header.vertices};
+}
+
 /// Returns the colour page of a page in canonical order.
 std::vector<uint4> inOrder(std::span<const std::byte> colour, const CodecPage& page) {
     std::vector<uint4> block(colour.size() / 16);
@@ -85,6 +92,10 @@ std::vector<uint4> inOrder(std::span<const std::byte> colour, const CodecPage& p
     for (size_t i = 0; i < page.vectorSource.size(); ++i)
         slabs[i] = vectorWord({oldFaces, faces}, page.vectorSource[i]);
     for (size_t i = 0; i < page.vertexSource.size(); ++i) vertices[i] = oldVertices[page.vertexSource[i]];
+    if (colour.size() == colourPageBytes(page.header)) return block;
+    const auto* oldPoints = reinterpret_cast<const TexturePoint*>(oldVertices + page.header.vertices);
+    const std::span<TexturePoint> points = pointsIn(block, page.header);
+    for (size_t i = 0; i < page.vertexSource.size(); ++i) points[i] = oldPoints[page.vertexSource[i]];
     return block;
 }
 
@@ -92,7 +103,9 @@ std::vector<uint4> inOrder(std::span<const std::byte> colour, const CodecPage& p
 template <class Coder>
 bool codeColour(Coder& coder, const PageView& page, std::span<uint4> block) {
     const std::span vertices(reinterpret_cast<uint32_t*>(block.data() + page.header.faces), page.header.vertices);
-    return std::make_unique<ColourCodec<Coder>>(coder, page, block.first(page.header.faces), vertices)->run();
+    const bool all = std::make_unique<ColourCodec<Coder>>(coder, page, block.first(page.header.faces), vertices)->run();
+    if (!all || block.size_bytes() == colourPageBytes(page.header)) return all;
+    return std::make_unique<PointCodec<Coder>>(coder, page, pointsIn(block, page.header))->run();
 }
 
 }  // namespace
@@ -124,7 +137,8 @@ std::optional<PackedPage> codedPage(const PageDraft& draft, std::span<const std:
     std::vector<uint4> block = inOrder(colour, page);
     RangeEncoder colourCoder;
     if (!codeColour(colourCoder, *view, block)) return {};
-    packed.colour = coded(colourCoder);
+    const bool isTextured = colour.size() != colourPageBytes(page.header);
+    packed.colour = coded(colourCoder, isTextured ? kTextured : kCoded);
     return packed;
 }
 
@@ -165,8 +179,9 @@ Result<std::vector<uint4>> unpackGeometry(std::span<const std::byte> packed, uin
 Result<std::vector<uint4>> unpackColour(std::span<const std::byte> packed, uint64_t colourBytes, const PageView& page) {
     if (packed.empty()) return broken("colour page does not decode: it is empty");
     if (packed[0] == kPlain) return unpackPlain(packed.subspan(1), colourBytes);
-    if (packed[0] != kCoded) return broken("colour page does not decode: unknown form");
-    if (colourPageBytes(page.header) != colourBytes) return broken("colour page does not decode to its size");
+    if (packed[0] != kCoded && packed[0] != kTextured) return broken("colour page does not decode: unknown form");
+    if ((packed[0] == kCoded ? colourPageBytes(page.header) : texturedPageBytes(page.header)) != colourBytes)
+        return broken("colour page does not decode to its size");
     std::vector<uint4> block(colourBytes / 16);
     RangeDecoder coder(packed.subspan(1));
     const bool all = codeColour(coder, page, block);

@@ -7,7 +7,8 @@
 //   slabs      the vector of each slab leaf, foretold by the planes beside it; its octants, foretold by its plane
 //   mesh       the distinct triangles of the hard leaves, growing across their edges; vertices by the parallelogram
 //              rule; normals as differences from those of the triangles
-//   colour     coded on its own: the colour of each corner, slab and vertex once, foretold by its neighbours
+//   colour     coded on its own: the colour of each corner, slab and vertex once, foretold by its neighbours. Byte 0
+//              is 3 where the vertices have texture coordinates and materials, too, which follow (point_codec.h)
 //
 // The numbers of children, faces and slabs and the leaves' lists and strips of triangles are derived.
 //

@@ -26,7 +26,7 @@ using test::asBytes, test::Block, test::randomColours, test::sheet, test::soup, 
 constexpr std::byte kPlain{0}, kCoded{1}, kMarked{2};
 
 /// A vertex with all that belongs to it; triangles as sorted triples of them.
-using Vertex = std::array<uint32_t, 4>;
+using Vertex = std::array<uint32_t, 7>;
 using Triangle = std::array<Vertex, 3>;
 
 std::vector<Triangle> trianglesOf(const PageView& page, uint32_t word) {
@@ -35,8 +35,11 @@ std::vector<Triangle> trianglesOf(const PageView& page, uint32_t word) {
         Triangle t;
         for (size_t i = 0; i < 3; ++i) {
             const uint32_t v = vertices[i];
-            t[i] = {page.vertices[v].x, page.vertices[v].y, page.normals[v],
-                    page.vertexColours.empty() ? 0 : page.vertexColours[v]};
+            const TexturePoint point = page.points.empty() ? TexturePoint{} : page.points[v];
+            t[i] = {page.vertices[v].x, page.vertices[v].y,
+                    page.normals[v],    page.vertexColours.empty() ? 0 : page.vertexColours[v],
+                    uint32_t(point.u),  uint32_t(point.v),
+                    point.material};
         }
         std::sort(t.begin(), t.end());
         triangles.push_back(t);
@@ -319,6 +322,100 @@ TEST(PageCodec, OpenMarksComeBack) {
     EXPECT_LE(with, without + 2);
     // No triangle is open in a part.
     expectRoundTrip(marked(unmarked, [](uint32_t number, glm::u32vec3) { return number % 2 == 0; }), kPlain);
+}
+
+/// Gives a page's vertices colours, and places in images. `pointOf(number, position)`: a vertex's.
+WholePage textured(WholePage page, const std::function<TexturePoint(uint32_t, glm::ivec3)>& pointOf) {
+    const PageHeader header = page.view().header;
+    page.colour = randomColours(page.view(), 3);
+    const size_t coloured = size_t{16} * header.faces + size_t{4} * header.vertices;
+    page.colour.resize(texturedPageBytes(header) / 16, uint4(0));
+    std::vector<TexturePoint> points;
+    for (uint32_t v = 0; v < header.vertices; ++v)
+        points.push_back(
+            pointOf(v, glm::ivec3(unpack21(parsePage(asBytes(page.geometry))->vertices[v])) - kLatticeBias));
+    std::memcpy(reinterpret_cast<std::byte*>(page.colour.data()) + coloured, points.data(),
+                points.size() * sizeof(TexturePoint));
+    return page;
+}
+
+TEST(PageCodec, TexturedPagesComeBack) {
+    const auto flat = [](uint32_t, glm::ivec3 p) { return TexturePoint{9 * p.x + 2 * p.y, 7 * p.y - p.x, 4}; };
+    const WholePage page = textured(sheet(1, 2, 3, 9).build(1), flat);
+    expectRoundTrip(page, kCoded);
+    EXPECT_EQ(packPage(asBytes(page.geometry), asBytes(page.colour)).colour[0], std::byte{3});
+    for (uint32_t seed = 0; seed < 40; ++seed) {
+        SCOPED_TRACE(seed);
+        std::mt19937 random(seed);
+        // Any coordinates at all, on grids of several steps, the largest and the smallest numbers among them.
+        const int shift = int(seed % 17);
+        const auto any = [&](uint32_t, glm::ivec3) {
+            const auto coordinate = [&] { return int32_t(uint32_t(random()) >> random() % 32 << shift); };
+            return TexturePoint{coordinate(), coordinate(), 1 + seed};
+        };
+        expectRoundTrip(textured(soup(seed, 1 + seed % 3, 1 + seed % 4, 20, 1 + seed % 20).build(seed), any), kCoded);
+        expectRoundTrip(textured(sheet(seed, 2, 3, 4 + seed % 9).build(seed), any), kCoded);
+    }
+    // Beside leaves of other kinds; and two sheets of which one has no image.
+    expectRoundTrip(textured(withLeavesOfAllKinds(soup(5, 2, 3, 20, 10).build(5), 5), flat), kCoded);
+    SoupPage two(3, 3);
+    for (int sheet = 0; sheet < 2; ++sheet)
+        for (int x = 0; x < 8; ++x)
+            two.triangle(two.vertex({1800 * x, 300, 5000 * sheet}), two.vertex({1800 * x + 900, 300, 5000 * sheet}),
+                         two.vertex({1800 * x, 1300, 5000 * sheet}));
+    expectRoundTrip(textured(two.build(7),
+                             [](uint32_t, glm::ivec3 p) {
+                                 return p.z > 2000 ? TexturePoint{p.x, p.y, 77} : TexturePoint{};
+                             }),
+                    kCoded);
+}
+
+TEST(PageCodec, WhatIsNoTexturedPageOfTheBuilderIsStoredPlainly) {
+    const auto formOf = [](const WholePage& page) {
+        expectRoundTrip(page, kPlain);
+        return packPage(asBytes(page.geometry), asBytes(page.colour)).colour[0];
+    };
+    const WholePage page = sheet(1, 2, 3, 9).build(1);
+    EXPECT_EQ(formOf(textured(page,
+                              [](uint32_t v, glm::ivec3) {
+                                  return TexturePoint{0, 0, v % 2};
+                              })),
+              kPlain)
+        << "two materials in one triangle";
+    EXPECT_EQ(formOf(textured(page,
+                              [](uint32_t, glm::ivec3) {
+                                  return TexturePoint{0, 7, 0};
+                              })),
+              kPlain)
+        << "coordinates without an image";
+}
+
+TEST(PageCodec, CoordinatesAreForetold) {
+    // An image lies over a sheet that is bent, without being stretched; and over one that is nearly flat, cut anywhere.
+    const auto bytesOf = [](const WholePage& page, uint32_t vertices) {
+        const auto packed = packPage(asBytes(page.geometry), asBytes(page.colour));
+        const auto without =
+            packPage(asBytes(page.geometry), asBytes(page.colour).first(colourPageBytes(page.view().header)));
+        return double(packed.colour.size() - without.colour.size()) / vertices;
+    };
+    SoupPage roof(4, 3);
+    std::mt19937 random(5);
+    std::map<std::pair<int, int>, uint32_t> numbers;
+    const auto vertex = [&](int i, int j) {
+        const auto [at, isNew] = numbers.try_emplace({i, j}, 0);
+        if (isNew) at->second = roof.vertex({1000 * i, 1000 * j, i < 8 ? 0 : 750 * (i - 8)});
+        return at->second;
+    };
+    for (int j = 0; j < 16; ++j)
+        for (int i = 0; i < 16; ++i) {
+            roof.triangle(vertex(i, j), vertex(i + 1, j), vertex(i, j + 1));
+            roof.triangle(vertex(i + 1, j), vertex(i + 1, j + 1), vertex(i, j + 1));
+        }
+    const auto along = [](uint32_t, glm::ivec3 p) {
+        const int x = p.x <= 8000 ? p.x : 8000 + (p.x - 8000) / 4 * 5;
+        return TexturePoint{3 * x + 1, 3 * p.y, 1};
+    };
+    EXPECT_LT(bytesOf(textured(roof.build(2), along), 17 * 17), 0.5);
 }
 
 TEST(PageCodec, SmoothSurfaceCostsLittle) {

@@ -1,0 +1,86 @@
+// The images of a .vcp file: what stands in its section of images (FileHeader::images), behind the pages.
+//
+//   24 bytes an image        ImageRow
+//   16 bytes a material      MaterialRow; triangles name them by their number plus 1
+//   24 bytes a tile          TileRow: image by image, coarse levels first, Morton order (x lowest) within a level
+//   ...                      the tiles (tile_codec.h), in the order of their table, without gaps
+//
+// The header has the hash of the three tables. No column or row of an image is stored twice: filters read beyond a
+// tile's edge in the tile beside it.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "octree/image/image_levels.h"
+#include "octree/image/images_place.h"
+#include "octree/io/byte_reader.h"
+#include "octree/io/result.h"
+
+namespace vcp {
+
+inline constexpr uint32_t kLosslessTiles = 1;  ///< a coding: tile_codec.h
+
+struct ImageRow {
+    uint32_t width = 0, height = 0;  ///< 1 to kMaxImageEdge
+    uint32_t levels = 0;             ///< as imageLevels() makes them
+    uint32_t coding = kLosslessTiles;
+    uint64_t firstTile = 0;  ///< of the coarsest level
+};
+static_assert(sizeof(ImageRow) == 24);
+
+/// How coordinates beyond an image's edge are read.
+enum class ImageWrap : uint8_t { Repeat, Clamp, Mirror };
+
+struct MaterialRow {
+    uint32_t image = 0;            ///< number of the image
+    uint32_t factor = 0xffffffff;  ///< RGBA8, multiplies the image's stored colours
+    ImageWrap wrapU = ImageWrap::Repeat, wrapV = ImageWrap::Repeat;
+    uint8_t reserved[6] = {};
+};
+static_assert(sizeof(MaterialRow) == 16);
+
+struct TileRow {
+    uint64_t offset = 0;  ///< in the file
+    uint64_t hash = 0;    ///< XXH3-64 of the stored bytes
+    uint32_t storedBytes = 0;
+    uint32_t reserved = 0;
+};
+static_assert(sizeof(TileRow) == 24);
+
+struct ImageTables {
+    std::vector<ImageRow> images;
+    std::vector<MaterialRow> materials;
+    std::vector<TileRow> tiles;
+
+    [[nodiscard]] uint64_t bytes() const {
+        return images.size() * sizeof(ImageRow) + materials.size() * sizeof(MaterialRow) +
+               tiles.size() * sizeof(TileRow);
+    }
+    /// Returns the tables as they are stored.
+    [[nodiscard]] std::vector<std::byte> stored() const;
+};
+
+/// Returns what is wrong with the place of a section in a file, whose pages end before `end`, in one line; empty where
+/// nothing is. `begin`: the end of the directory.
+std::string wrongPlace(const ImagesPlace& place, uint64_t begin, uint64_t end);
+
+/// Reads and checks the tables of a section whose place was checked. They may be hostile: no more is allocated than
+/// the section has bytes. Errors: InvalidInput (with file and byte), Io.
+Result<ImageTables> readImageTables(const ByteReader& reader, const ImagesPlace& place);
+
+/// Reads a tile, checks its hash and decodes it. `number`: in the table; `size`: its texels along both axes; `texels`:
+/// room for them. Errors: InvalidInput, Io. Any thread.
+Result<void> readTile(const ByteReader& reader, const ImageTables& tables, uint64_t number, glm::uvec2 size,
+                      std::span<uint32_t> texels);
+
+/// Reads and checks the section: its tables, and each tile. `progress` is called with the bytes up to where the file is
+/// checked; false cancels. Errors: InvalidInput, Io, Cancelled.
+Result<void> verifyImages(const ByteReader& reader, const ImagesPlace& place,
+                          const std::function<bool(uint64_t)>& progress);
+
+}  // namespace vcp
