@@ -19,6 +19,8 @@
 #include "builder/dataset_assembly.h"
 #include "builder/deal.h"
 #include "builder/estimate.h"
+#include "builder/image_store.h"
+#include "builder/lattice/mesh_textures.h"
 #include "builder/level_plan.h"
 #include "builder/memory_plan.h"
 #include "builder/mesh/open_mesh.h"
@@ -236,6 +238,8 @@ private:
         pass_ = done_.pass;
         firstBin_ = done_.bin;
         if (pass_ >= 0) openPass();
+        openImages(done_.files.images.size());
+        if (done_.files.bins.contains("textures")) openTextures();
         VCP_TRY(files_.reopen(done_, space_));
         if (firstBin_ >= std::max<size_t>(binsOfPass(), 1))
             return Error{.code = ErrorCode::InvalidInput,
@@ -361,12 +365,40 @@ private:
         return choice;
     }
 
+    /// Codes the images that the file is to keep. Returns what it has of each of the soup's materials; empty where that
+    /// is nothing.
+    Result<std::vector<PlacedMaterial>> keepImages() {
+        std::vector<PlacedMaterial> placed;
+        if (!options_.keepImages || !colourUse().materials) return placed;
+        openImages(1);
+        const double begins = kReadingShare + kDealingShare / 2;
+        VCP_TRY_ASSIGN(placed, storeImages(files_.soup->materials, memory_.vertexBytes, files_.images.front(),
+                                           [&](double) { return progress("sorting", begins); }));
+        if (!placed.empty()) openTextures();
+        return placed;
+    }
+
+    void openImages(size_t count) {
+        for (size_t i = 0; i < count; ++i) files_.images.emplace_back(space_, uint32_t(i), "image");
+    }
+    void openTextures() {
+        files_.textures = std::make_unique<RecordBins<TexturedTriangle>>(space_, "textures", plan_.finest.bins(),
+                                                                         memory_.bufferBytes / 4);
+    }
+
     Result<void> dealSoup() {
         std::optional<MaterialColours> colours;
         if (colourUse().materials) colours.emplace(files_.soup->materials, memory_.vertexBytes);
-        const LatticeSnapper snapper(plan_.frame, colours ? &*colours : nullptr, colourUse().vertices, plan_.pages);
+        VCP_TRY_ASSIGN(const auto placed, arena_.execute([&] { return keepImages(); }));
+        const LatticeSnapper snapper(plan_.frame, colours ? &*colours : nullptr, colourUse().vertices, plan_.pages,
+                                     placed);
         const double begins = kReadingShare + kDealingShare / 2;
-        const Dealing dealing{*files_.soup, snapper, plan_.gridOf(pass_ - 1),
+        const Dealing dealing{*files_.soup,
+                              snapper,
+                              plan_.gridOf(pass_ - 1),
+                              files_.textures.get(),
+                              plan_.pages,
+                              plan_.marginCells(),
                               [&](double part) { return progress("sorting", begins + kDealingShare / 2 * part); }};
         openPass();
         VCP_TRY(arena_.execute([&] { return dealTriangles(dealing, plan_.finest, *files_.current); }));
@@ -532,6 +564,10 @@ private:
             }
             // A bin without triangles has no corner that triangles could wait for, so nothing is passed on.
             if (mesh.positions.empty()) return {};
+            if (pass_ + 1 == plan_.levels() && files_.textures) {
+                VCP_TRY_ASSIGN(auto known, files_.textures->load(bin));
+                addTextures(mesh, std::move(known));
+            }
             if (!vertices)
                 VCP_TRY(buildBinPages(plan_, mesh,
                                       {.pass = pass_,
@@ -582,6 +618,8 @@ private:
         if (files_.vertices) VCP_TRY(files_.vertices->raw().flush());
         std::unique_ptr<RecordBins<VertexImage>> joined;
         if (pass_ < plan_.levels()) joined = std::move(files_.vertices);
+        std::unique_ptr<RecordBins<TexturedTriangle>> placed;
+        if (pass_ < plan_.levels()) placed = std::move(files_.textures);
         auto finished = std::move(files_.current);
         auto waited = std::move(files_.waiting);
         files_.current = std::move(files_.next);
@@ -592,6 +630,7 @@ private:
         if (finished) finished->raw().remove();
         if (waited) waited->raw().remove();
         if (joined) joined->raw().remove();
+        if (placed) placed->raw().remove();
         if (plan_.isOfSlabs(pass_)) files_.surfaces[size_t(pass_) + 1].remove();
         return {};
     }
@@ -609,9 +648,10 @@ private:
         VCP_TRY(joinParts());
         FileHeader header = headerOf(plan_, measures_, hasColour(), meshParts_->counts);
         VCP_TRY_ASSIGN(report_.fileBytes,
-                       assembleDataset(files_.spools, header, options_.output, rules(), [this](double part) {
-                           return progress("writing", 1 - kWritingShare + kWritingShare * part);
-                       }));
+                       assembleDataset(files_.spools, header, options_.output, rules(),
+                                       files_.images.empty() ? nullptr : &files_.images.front(), [this](double part) {
+                                           return progress("writing", 1 - kWritingShare + kWritingShare * part);
+                                       }));
         describe(header, report_);
         progress("done", 1);
         return {};
@@ -661,9 +701,12 @@ namespace {
 template <class Work>
 auto withPlan(const BuildOptions& options, const Work& work) -> decltype(work(options, MemoryPlan(), 1u)) {
     if (options.inputs.empty()) return Error{.code = ErrorCode::Usage, .message = "no input mesh given"};
+    if (options.keepImages && options.error > 0)
+        return Error{.code = ErrorCode::Usage,
+                     .message = "images lie on the mesh's own triangles; leave out the error that allows others"};
     const unsigned threads = threadsOf(options);
-    VCP_TRY_ASSIGN(auto plan,
-                   planMemory(options.memoryBytes > 0 ? options.memoryBytes : defaultMemoryBytes(), threads));
+    VCP_TRY_ASSIGN(auto plan, planMemory(options.memoryBytes > 0 ? options.memoryBytes : defaultMemoryBytes(), threads,
+                                         options.keepImages));
     BuildOptions expanded = options;
     VCP_TRY_ASSIGN(auto inputs, expandInputs(options.inputs));
     expanded.inputs = std::move(inputs);

@@ -59,6 +59,9 @@ struct BuildOptions {
     double checkpointSeconds = 15;  ///< least time between checkpoints, which make what is done durable
     ColourChoice colour = ColourChoice::Auto;
     CoarseLeaves coarseLeaves = CoarseLeaves::Slabs;
+    /// Keeps the images of the materials, and where triangles of the finest level are in them; colours at vertices
+    /// stay.
+    bool keepImages = false;
     /// Is given what is read, for a picture meanwhile (mesh_sample.h); nothing where work is resumed. May be empty.
     std::shared_ptr<MeshSample> sample;
     /// Called from one thread at a time, about ten times a second and whenever a stage begins. Returning false cancels;

@@ -14,7 +14,7 @@ namespace {
 using nlohmann::json;
 
 // Version of the temporary files; a build does not continue from another version's.
-constexpr int kTempVersion = 13;
+constexpr int kTempVersion = 14;
 
 json jsonOf(glm::dvec3 v) { return {v.x, v.y, v.z}; }
 
@@ -124,6 +124,7 @@ Recorded::Files filesFrom(Fields& all) {
     for (const auto& [name, bytes] : all.object("files").items()) files.bins[name] = all.countOf(bytes);
     files.spools = spoolsFrom(all, "spools");
     files.surfaces = spoolsFrom(all, "surfaces");
+    files.images = spoolsFrom(all, "images");
     return files;
 }
 
@@ -158,6 +159,7 @@ std::vector<std::pair<const char*, RawBins*>> binsOf(WorkFiles& files) {
     if (files.next) bins.emplace_back("next", &files.next->raw());
     if (files.parts) bins.emplace_back("parts", &files.parts->raw());
     if (files.vertices) bins.emplace_back("vertices", &files.vertices->raw());
+    if (files.textures) bins.emplace_back("textures", &files.textures->raw());
     if (files.waiting) bins.emplace_back("waiting", &files.waiting->raw());
     return bins;
 }
@@ -191,9 +193,9 @@ Result<void> reopenSpools(std::deque<PageSpool>& spools, const SpoolLengths& len
 }  // namespace
 
 std::string buildFingerprint(const BuildOptions& options) {
-    std::string text =
-        fmt::format("{} {} {:a} {:a} {} {} {} {}", kTempVersion, kFileVersion, options.cell, options.error,
-                    options.errorIsRelative, int(options.colour), int(options.coarseLeaves), options.format);
+    std::string text = fmt::format("{} {} {:a} {:a} {} {} {} {} {}", kTempVersion, kFileVersion, options.cell,
+                                   options.error, options.errorIsRelative, int(options.colour),
+                                   int(options.coarseLeaves), options.keepImages, options.format);
     for (const auto& input : options.inputs) {
         std::error_code ignored;
         const auto size = std::filesystem::file_size(input, ignored);
@@ -251,7 +253,8 @@ Result<json> WorkFiles::sync() {
     }
     VCP_TRY_ASSIGN(const auto pages, syncSpools(spools, spools.size()));
     VCP_TRY_ASSIGN(const auto cells, syncSpools(surfaces, neededSurfaces));
-    return json{{"files", files}, {"spools", pages}, {"surfaces", cells}};
+    VCP_TRY_ASSIGN(const auto pictures, syncSpools(images, images.size()));
+    return json{{"files", files}, {"spools", pages}, {"surfaces", cells}, {"images", pictures}};
 }
 
 Result<void> WorkFiles::reopen(const Recorded& recorded, TempSpace& space) {
@@ -274,13 +277,16 @@ Result<void> WorkFiles::reopen(const Recorded& recorded, TempSpace& space) {
         bins.emplace_back(raw, found->second);
         kept.push_back(raw->fileName());
     }
-    if (recorded.files.spools.size() != spools.size() || recorded.files.surfaces.size() != surfaces.size())
+    if (recorded.files.spools.size() != spools.size() || recorded.files.surfaces.size() != surfaces.size() ||
+        recorded.files.images.size() != images.size())
         return unlike("is of another number of levels");
     keepSpools(spools, recorded.files.spools, kept);
     keepSpools(surfaces, recorded.files.surfaces, kept);
+    keepSpools(images, recorded.files.images, kept);
     space.folder().clear(kept);
     for (const auto& [raw, bytes] : bins) VCP_TRY(raw->reopen(bytes));
     VCP_TRY(reopenSpools(spools, recorded.files.spools));
+    VCP_TRY(reopenSpools(images, recorded.files.images));
     return reopenSpools(surfaces, recorded.files.surfaces);
 }
 

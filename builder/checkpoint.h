@@ -30,10 +30,10 @@ nlohmann::json jsonOf(const std::vector<SideFile>& files);
 
 /// What the journal's lines say together.
 struct Recorded {
-    /// Lengths of the files of bins, and of each level's pages and surfaces in bytes and entries.
+    /// Lengths of the files of bins, and of each level's pages and surfaces, and of images, in bytes and entries.
     struct Files {
         std::map<std::string, uint64_t> bins;
-        std::vector<std::pair<uint64_t, uint64_t>> spools, surfaces;
+        std::vector<std::pair<uint64_t, uint64_t>> spools, surfaces, images;
     };
 
     std::string stage;  ///< "": nothing is recorded; "read", "levels"
@@ -61,7 +61,9 @@ struct WorkFiles {
     std::unique_ptr<RecordBins<VertexImage>>
         vertices;  ///< what bins of the finest level know of each other's triangles
     std::unique_ptr<PartNotes> parts;
-    std::deque<PageSpool> spools;    ///< finished pages of each level, coarse first
+    std::unique_ptr<RecordBins<TexturedTriangle>> textures;  ///< of the finest level's triangles that have images
+    std::deque<PageSpool> images;                            ///< one, or none where the file keeps no images
+    std::deque<PageSpool> spools;                            ///< finished pages of each level, coarse first
     std::deque<PageSpool> surfaces;  ///< the surface in them, where levels are made from that (slab_pages.h)
     size_t neededSurfaces = 0;       ///< how many of them, coarse first, are still needed
 

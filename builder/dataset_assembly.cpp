@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <vector>
 
+#include "builder/image_store.h"
 #include "octree/page/page.h"
 #include "octree/vcp_writer.h"
 
@@ -85,6 +86,18 @@ void describeLevels(const std::deque<PageSpool>& levels, FileHeader& header) {
     header.hardLeaves = finest.hardLeaves;
 }
 
+Result<void> appendImages(const PageSpool& images, VcpWriter& writer) {
+    VCP_TRY_ASSIGN(auto tables, storedTables(images));
+    if (tables.images.empty()) return {};
+    const size_t tiles = tables.tiles.size();
+    VCP_TRY(writer.beginImages(std::move(tables)));
+    for (size_t i = 0; i < tiles; ++i) {
+        VCP_TRY_ASSIGN(const auto tile, images.read(images.entries()[i]));
+        VCP_TRY(writer.appendTile(tile.geometry));
+    }
+    return {};
+}
+
 }  // namespace
 
 FileHeader headerOf(const SoupMeasures& measures, const GridFrame& frame, double errorTarget, bool hasColour) {
@@ -105,7 +118,8 @@ FileHeader headerOf(const SoupMeasures& measures, const GridFrame& frame, double
 }
 
 Result<uint64_t> assembleDataset(std::deque<PageSpool>& levels, FileHeader& header, const std::filesystem::path& output,
-                                 const OutputRules& rules, const std::function<bool(double)>& progress) {
+                                 const OutputRules& rules, const PageSpool* images,
+                                 const std::function<bool(double)>& progress) {
     addPassages(levels);
     linkChildren(levels);
     foldParts(levels);
@@ -119,6 +133,7 @@ Result<uint64_t> assembleDataset(std::deque<PageSpool>& levels, FileHeader& head
             VCP_TRY(writer->append(entry, page));
             if (!progress(double(++done) / double(header.pages + 1))) return Error::cancelled(output.string());
         }
+    if (images != nullptr) VCP_TRY(appendImages(*images, *writer));
     return writer->commit(header);
 }
 

@@ -18,9 +18,10 @@ FileHeader headerOf(const SoupMeasures& measures, const GridFrame& frame, double
 
 /// Links parents and children, and writes the file. A page without a parent gets one that only leads to it. `levels`:
 /// pages of each level, coarse first, in any order; entries are completed. `header`: that of headerOf; levels,
-/// pages, leaves and certified errors are filled in. `progress` is given the part done; false cancels. Returns the
-/// file's bytes. Errors: Io, Cancelled.
+/// pages, leaves and certified errors are filled in. `images`: those of the file (image_store.h); may be null.
+/// `progress` is given the part done; false cancels. Returns the file's bytes. Errors: Io, Cancelled.
 Result<uint64_t> assembleDataset(std::deque<PageSpool>& levels, FileHeader& header, const std::filesystem::path& output,
-                                 const OutputRules& rules, const std::function<bool(double)>& progress);
+                                 const OutputRules& rules, const PageSpool* images,
+                                 const std::function<bool(double)>& progress);
 
 }  // namespace vcp

@@ -7,6 +7,7 @@
 #include <map>
 #include <mutex>
 #include <numeric>
+#include <optional>
 #include <set>
 
 #include <fmt/format.h>
@@ -20,8 +21,8 @@ namespace {
 
 uint64_t trianglesOf(const Soup& soup) { return soup.floats.raw().total() + soup.doubles.raw().total(); }
 
-/// Calls visit(piece) for every triangle of the soup on the lattice, then visit.finish(), with a visit of its own
-/// for each block of the soup.
+/// Calls visit(piece, its place in an image) for every triangle of the soup on the lattice, then visit.finish(), with a
+/// visit of its own for each block of the soup.
 template <class MakeVisit>
 Result<void> forLatticeTriangles(const Soup& soup, const LatticeSnapper& snapper, bool painted,
                                  const std::function<bool(double)>& progress, MakeVisit&& makeVisit) {
@@ -41,8 +42,8 @@ Result<void> forLatticeTriangles(const Soup& soup, const LatticeSnapper& snapper
         for (const auto& t : records)
             snapper.add(
                 t,
-                [&](const LatticeTriangle& piece) {
-                    if (here) here = visit(piece);
+                [&](const LatticeTriangle& piece, const std::optional<TexturedTriangle>& place) {
+                    if (here) here = visit(piece, place);
                 },
                 painted);
         if (here) here = visit.finish();
@@ -116,7 +117,7 @@ struct CountVisit {
     std::atomic<uint64_t>& counted;  ///< pages that all threads count
     uint64_t mostPages;
 
-    Result<void> operator()(const LatticeTriangle& t) {
+    Result<void> operator()(const LatticeTriangle& t, const std::optional<TexturedTriangle>&) {
         if (!parted.empty() && !box.touches(t)) return {};
         pages.forPagesNear(t.corner, marginCells, pages.base(), [&](uint32_t level, uint64_t code) {
             if (!parted.empty() && (level == pages.base() || !parted.contains({level - 1, code >> 3}))) return;
@@ -192,32 +193,63 @@ private:
     PageCounts partedLast_;
 };
 
+/// Deals triangles with images to the bins of the pages that need them.
+class TextureBatch {
+public:
+    TextureBatch(const Dealing& dealing, const PagePartition& partition) {
+        if (dealing.textures == nullptr) return;
+        near_.emplace(dealing.pages, partition, dealing.marginCells);
+        batch_.emplace(*dealing.textures);
+    }
+    Result<void> add(const std::optional<TexturedTriangle>& place) {
+        if (!place) return {};
+        for (const size_t bin : near_->of(place->corner)) VCP_TRY(batch_->add(bin, *place));
+        return {};
+    }
+    Result<void> flush() { return batch_ ? batch_->flush() : Result<void>(); }
+
+private:
+    std::optional<BinsNear> near_;
+    std::optional<BinBatch<TexturedTriangle>> batch_;
+};
+
 struct DealVisit {
     const PageGrid& grid;
     const PagePartition& partition;
     BinBatch<LatticeTriangle> batch;
+    TextureBatch textures;
 
-    Result<void> operator()(const LatticeTriangle& t) {
+    Result<void> operator()(const LatticeTriangle& t, const std::optional<TexturedTriangle>& place) {
+        VCP_TRY(textures.add(place));
         size_t bin[3];
         for (int i = 0; i < 3; ++i) bin[i] = partition.binOf(grid.pageOf(t.corner[i]));
         for (int i = 0; i < 3; ++i)
             if (std::find(bin, bin + i, bin[i]) == bin + i) VCP_TRY(batch.add(bin[i], t));
         return {};
     }
-    Result<void> finish() { return batch.flush(); }
+    Result<void> finish() {
+        VCP_TRY(textures.flush());
+        return batch.flush();
+    }
 };
 
 /// Deals where there is one bin: nothing is sorted.
 struct OneBinVisit {
     RecordBins<LatticeTriangle>& bins;
-    std::vector<LatticeTriangle> held;
+    TextureBatch textures;
+    std::vector<LatticeTriangle> held = {};
 
-    Result<void> operator()(const LatticeTriangle& t) {
+    Result<void> operator()(const LatticeTriangle& t, const std::optional<TexturedTriangle>& place) {
         constexpr size_t kMostHeld = 4096;
+        VCP_TRY(textures.add(place));
         held.push_back(t);
-        return held.size() < kMostHeld ? Result<void>() : finish();
+        return held.size() < kMostHeld ? Result<void>() : append();
     }
     Result<void> finish() {
+        VCP_TRY(textures.flush());
+        return append();
+    }
+    Result<void> append() {
         VCP_TRY(bins.append(0, held));
         held.clear();
         return {};
@@ -273,9 +305,12 @@ Result<void> dealTriangles(const Dealing& dealing, const PagePartition& partitio
         return forLatticeTriangles(dealing.soup, dealing.snapper, true, dealing.progress, makeVisit);
     };
     if (partition.bins() == 1)
-        VCP_TRY(deal([&] { return OneBinVisit{bins, {}}; }));
+        VCP_TRY(deal([&] { return OneBinVisit{bins, TextureBatch(dealing, partition)}; }));
     else
-        VCP_TRY(deal([&] { return DealVisit{dealing.grid, partition, BinBatch(bins)}; }));
+        VCP_TRY(deal([&] {
+            return DealVisit{dealing.grid, partition, BinBatch(bins), TextureBatch(dealing, partition)};
+        }));
+    if (dealing.textures != nullptr) VCP_TRY(dealing.textures->raw().flush());
     return bins.raw().flush();
 }
 

@@ -9,6 +9,7 @@
 #include "builder/ingest.h"
 #include "builder/lattice/finest_pages.h"
 #include "builder/lattice_soup.h"
+#include "builder/level/level_step.h"
 #include "builder/spill/record_bins.h"
 
 namespace vcp {
@@ -53,6 +54,10 @@ struct Dealing {
     const Soup& soup;
     const LatticeSnapper& snapper;
     PageGrid grid;  ///< grid of the deepest level
+    /// Take triangles with images, by the pages that need them; null: there are none.
+    RecordBins<TexturedTriangle>* textures;
+    const FinestPages& pages;
+    double marginCells;  ///< how far around a page it needs them
     /// Called with the part of the soup that is read; false cancels. Any of the threads calls it.
     std::function<bool(double)> progress;
 };

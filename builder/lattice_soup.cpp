@@ -22,16 +22,22 @@ glm::i32vec3 roundTo(glm::dvec3 p, int step) { return glm::i32vec3(p / double(st
 // area are left out, and rays in single precision miss long needles by about as much.
 constexpr int kMostRoundings = 3;
 
+// Coordinates within so many repetitions of an image are kept as they are; a TexturePoint holds somewhat more than
+// twice as many.
+constexpr double kMostRepetitions = 1000;
+
 }  // namespace
 
-LatticeSnapper::LatticeSnapper(const GridFrame& frame, MaterialColours* colours, bool vertexColours, FinestPages pages)
+LatticeSnapper::LatticeSnapper(const GridFrame& frame, MaterialColours* colours, bool vertexColours, FinestPages pages,
+                               std::span<const PlacedMaterial> placed)
     : origin_(frame.origin),
       scale_(double(kLatticePerCell) / frame.cell),
       longest_(std::ldexp(colours && colours->hasImages() ? kPaintedEdgeCells : double(kMaxEdgeCells),
                           int(PageGrid::kLog2LatticePerCell + pages.deepest() - pages.base()))),
       colours_(colours),
       vertexColours_(vertexColours),
-      pages_(std::move(pages)) {}
+      pages_(std::move(pages)),
+      placed_(placed) {}
 
 bool LatticeSnapper::tooLong(glm::i32vec3 a, glm::i32vec3 b) const {
     const glm::dvec3 d = glm::dvec3(a) - glm::dvec3(b);
@@ -103,6 +109,27 @@ void LatticeSnapper::paint(Piece& piece) const {
     for (int i = 0; i < 3; ++i)
         piece.triangle.colour[i] =
             vertexColours_ ? modulate(piece.triangle.colour[i], painted[size_t(i)]) : painted[size_t(i)];
+}
+
+std::optional<TexturedTriangle> LatticeSnapper::placeOf(const Piece& piece) const {
+    if (piece.material == 0 || placed_[piece.material - 1].number == 0) return {};
+    const LatticeTriangle& t = piece.triangle;
+    if (vertexColours_ && (t.colour[0] & t.colour[1] & t.colour[2]) != kWhite) return {};
+    const PlacedMaterial& placed = placed_[piece.material - 1];
+    TexturedTriangle place{{t.corner[0], t.corner[1], t.corner[2]}, {}, placed.number};
+    for (int axis = 0; axis < 2; ++axis) {
+        const double low = std::min({piece.uv[0][axis], piece.uv[1][axis], piece.uv[2][axis]}),
+                     high = std::max({piece.uv[0][axis], piece.uv[1][axis], piece.uv[2][axis]});
+        // Far from the image, whole repetitions are left out: two at a time, since every other one may be mirrored.
+        const bool isFar = low < -kMostRepetitions || high > kMostRepetitions;
+        const double whole = isFar ? 2 * std::floor(low / 2) : 0;
+        if (!(high - whole <= 2 * kMostRepetitions)) return {};
+        for (int i = 0; i < 3; ++i) {
+            const double steps = std::ldexp(double(piece.uv[i][axis]) - whole, -kLog2TextureUnit - int(placed.shift));
+            place.point[i][axis] = int32_t(std::floor(steps + 0.5)) * (1 << placed.shift);
+        }
+    }
+    return place;
 }
 
 float LatticeSnapper::strayOf(const Piece& piece) const {

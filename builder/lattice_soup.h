@@ -1,6 +1,9 @@
 // Brings the soup from world space to the finest level's lattice: snapped, long edges cut, colours settled.
 #pragma once
 
+#include <optional>
+#include <span>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -16,17 +19,26 @@ namespace vcp {
 /// Where images give the colour, vertices are at most so many cells of the base level apart, since they carry it.
 inline constexpr double kPaintedEdgeCells = 1.5;
 
+/// What the file has of a material's image.
+struct PlacedMaterial {
+    uint32_t number = 0;  ///< in the file's table, plus 1; 0: it has none
+    uint32_t shift = 0;   ///< so many lowest bits of coordinates (TexturePoint) are finer than its texels ask for
+    bool operator==(const PlacedMaterial&) const = default;
+};
+
 /// Snaps triangles to a frame's lattice. Any thread.
 class LatticeSnapper {
 public:
     /// `colours`: those of the soup's materials; null: vertices keep their own. `vertexColours`: whether these count.
-    /// `pages`: the pages that vertices must suit, on the frame's lattice.
+    /// `pages`: the pages that vertices must suit, on the frame's lattice. `placed`: of the soup's materials; none
+    /// where the file keeps no images. It must outlive the snapper.
     explicit LatticeSnapper(const GridFrame& frame, MaterialColours* colours = nullptr, bool vertexColours = true,
-                            FinestPages pages = FinestPages());
+                            FinestPages pages = FinestPages(), std::span<const PlacedMaterial> placed = {});
 
-    /// Gives the triangle, or its pieces, to `sink(const LatticeTriangle&)`; some may have no area on the lattice
-    /// (collapsed_triangles.h). An edge is cut at the same lattice point in every triangle that has it, so no crack
-    /// opens. `painted`: with the materials' colours.
+    /// Gives the triangle, or its pieces, to `sink(const LatticeTriangle&)`, or to `sink(const LatticeTriangle&, const
+    /// std::optional<TexturedTriangle>&)`, with its place in an image that the file keeps; some may have no area on the
+    /// lattice (collapsed_triangles.h). An edge is cut at the same lattice point in every triangle that has it, so no
+    /// crack opens. `painted`: with the materials' colours.
     template <class Real, class Sink>
     void add(const WorldTriangle<Real>& triangle, Sink&& sink, bool painted = true) const {
         cutInto(snap(triangle), sink, painted && colours_);
@@ -61,6 +73,9 @@ private:
     /// Cuts each edge that is too long in its middle. Returns the number of pieces, 0 when none is too long.
     int cut(const Piece& piece, Piece (&pieces)[4]) const;
     void paint(Piece& piece) const;
+    /// Returns the piece's place in an image; none where it has none, is tinged by its vertices' own colours, or lies
+    /// too far from the image to say where.
+    [[nodiscard]] std::optional<TexturedTriangle> placeOf(const Piece& piece) const;
     [[nodiscard]] float strayOf(const Piece& piece) const;
 
     template <class Sink>
@@ -69,9 +84,14 @@ private:
         const int count = cut(piece, pieces);
         for (int i = 0; i < count; ++i) cutInto(pieces[i], sink, painted);
         if (count > 0) return;
+        std::optional<TexturedTriangle> place;
+        if (painted && !placed_.empty()) place = placeOf(piece);
         if (painted) paint(piece);
         piece.triangle.stray = strayOf(piece);
-        sink(std::as_const(piece.triangle));
+        if constexpr (std::is_invocable_v<Sink&, const LatticeTriangle&>)
+            sink(std::as_const(piece.triangle));
+        else
+            sink(std::as_const(piece.triangle), std::as_const(place));
     }
 
     glm::dvec3 origin_;
@@ -79,6 +99,7 @@ private:
     MaterialColours* colours_;
     bool vertexColours_;
     FinestPages pages_;
+    std::span<const PlacedMaterial> placed_;
 };
 
 }  // namespace vcp

@@ -51,7 +51,8 @@ Result<BuiltPage> buildPage(const LevelSettings& settings, const LatticeMesh& me
 
 uint64_t bytesOf(const LatticeMesh& mesh) {
     return mesh.positions.size() * (sizeof(glm::i32vec3) + 2 * sizeof(uint32_t)) +
-           mesh.triangles.size() * (sizeof mesh.triangles[0] + sizeof(float));
+           mesh.triangles.size() * (sizeof mesh.triangles[0] + sizeof(float)) +
+           mesh.textures.size() * sizeof mesh.textures[0];
 }
 
 /// Measures of triangles, each counted by itself; in cells.
@@ -74,15 +75,18 @@ Extents extentsOf(const LatticeMesh& mesh, std::span<const uint32_t> triangles, 
     return sum;
 }
 
+// Where a page's triangles have images, each takes so much more: its vertices may all be its own, with their places.
+constexpr uint64_t kTexturedWorkBytes = 150;
+
 /// Returns the memory to build a page of these triangles: its bytes first, then the surface in it.
 uint64_t workOf(const LevelSettings& settings, const LatticeMesh& mesh, std::span<const uint32_t> triangles,
                 bool withSurface) {
     const uint64_t count = triangles.size();
-    if (settings.exact && !withSurface) return exactPageWorkBytes(count);
+    const uint64_t exact = exactPageWorkBytes(count) + (mesh.textures.empty() ? 0 : kTexturedWorkBytes * count);
+    if (settings.exact && !withSurface) return exact;
     const double margin = settings.exact ? kExactMarginCells : kBinMarginCells;
     const Extents extents = extentsOf(mesh, triangles, settings.grid.edgeCells() + 2 * margin);
-    if (settings.exact)
-        return std::max(exactPageWorkBytes(count), surfaceWorkBytes(count, extents.area, extents.perimeter));
+    if (settings.exact) return std::max(exact, surfaceWorkBytes(count, extents.area, extents.perimeter));
     // The cells that a flat shape touches: its area over three axes, its rim, and those of its corners.
     return pageWorkBytes(count, uint64_t(1.75 * extents.area + 1.5 * extents.perimeter + 4 * double(count)));
 }

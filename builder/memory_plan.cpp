@@ -23,6 +23,8 @@ constexpr uint64_t kLeastUsable = 96 * kMiB;
 
 // A bin's records, its mesh, and what the step to the coarser level needs; measured, with some room to spare.
 constexpr uint64_t kBinTriangleBytes = 260;
+// Where a triangle is in an image: its record, and in the mesh.
+constexpr uint64_t kTextureBytes = 64 + 36;
 
 // A page's directory entry, of 80 bytes: in the pages' list and in that of the surfaces, both with the coarser levels
 // and with room to grow, and at the end, alone, in the file's directory.
@@ -50,7 +52,7 @@ uint64_t defaultMemoryBytes() {
 
 uint64_t fixedMemoryBytes(unsigned threads) { return kBaseBytes + threads * kThreadBytes; }
 
-Result<MemoryPlan> planMemory(uint64_t memoryBytes, unsigned threads) {
+Result<MemoryPlan> planMemory(uint64_t memoryBytes, unsigned threads, bool withImages) {
     const uint64_t fixed = fixedMemoryBytes(threads);
     if (memoryBytes < fixed + kLeastUsable)
         return Error{
@@ -66,7 +68,7 @@ Result<MemoryPlan> planMemory(uint64_t memoryBytes, unsigned threads) {
     plan.bufferBytes = usable / 16;
     // Pages get what temporary files, the next level's blocks and those of waiting triangles leave.
     plan.pageBytes = usable - plan.tempBytes - plan.bufferBytes * 5 / 4;
-    plan.binTriangles = usable / 3 / kBinTriangleBytes;
+    plan.binTriangles = usable / 3 / (kBinTriangleBytes + (withImages ? kTextureBytes : 0));
     return plan;
 }
 

@@ -28,8 +28,9 @@ uint64_t defaultMemoryBytes();
 /// Returns the bytes that a build takes whatever its input: the program, its readers and its threads.
 uint64_t fixedMemoryBytes(unsigned threads);
 
-/// Divides the memory. Errors: Limit (too little to work with; the message says how much is needed).
-Result<MemoryPlan> planMemory(uint64_t memoryBytes, unsigned threads);
+/// Divides the memory. `withImages`: triangles have places in images. Errors: Limit (too little to work with; the
+/// message says how much is needed).
+Result<MemoryPlan> planMemory(uint64_t memoryBytes, unsigned threads, bool withImages = false);
 
 /// Sets memory aside for the directory of so many pages that hold the mesh, and of those above them, and for what each
 /// bin takes by itself. Errors: Limit (as planMemory's).

@@ -12,6 +12,7 @@
 #include <glm/vec3.hpp>
 
 #include "builder/lattice/soup.h"
+#include "octree/page/page.h"
 #include "octree/vcp_file.h"
 
 namespace vcp {
@@ -23,6 +24,8 @@ struct LatticeMesh {
     std::vector<std::array<uint32_t, 3>> triangles;  ///< none without area, none twice
     std::vector<float> stray;     ///< cells, one a triangle: how far its points may be from the mesh's, both ways
     std::vector<uint32_t> parts;  ///< that vertices belong to, as many as positions; empty: kClosedPart
+    /// Where triangles are in images, one a triangle, corner by corner (addTextures); empty where there are none.
+    std::vector<std::array<TexturePoint, 3>> textures;
 
     /// Returns whether a triangle is of a closed part or of an open one, as PageEntry::parts says it.
     [[nodiscard]] uint8_t kindOf(uint32_t triangle) const {

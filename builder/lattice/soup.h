@@ -34,4 +34,13 @@ struct LatticeTriangle {
 };
 static_assert(sizeof(LatticeTriangle) == 68);
 
+/// Where a triangle of the deepest level's lattice is in an image, for triangles that have one. It travels by itself,
+/// and finds its triangle by the corners.
+struct TexturedTriangle {
+    glm::i32vec3 corner[3];
+    glm::i32vec2 point[3];  ///< of the corners, as TexturePoint (octree/page/page.h) has it
+    uint32_t material;      ///< likewise
+};
+static_assert(sizeof(TexturedTriangle) == 64);
+
 }  // namespace vcp

@@ -12,29 +12,29 @@
 
 namespace vcp {
 
-uint64_t LevelSink::Batch::pageAround(const LatticeTriangle& t) const {
-    const FinestPages& pages = sink_.pages_;
-    const PageGrid grid = pages.gridOf(pages.base());
-    const uint32_t log2Steps = PageGrid::kLog2LatticePerCell + pages.deepest() - pages.base();
+uint64_t BinsNear::pageAround(const glm::i32vec3 (&corner)[3]) const {
+    const PageGrid grid = pages_.gridOf(pages_.base());
+    const uint32_t log2Steps = PageGrid::kLog2LatticePerCell + pages_.deepest() - pages_.base();
     // Bounds are widened by a little more than forPagesNear does.
-    const auto margin = int64_t(std::ldexp(sink_.marginCells_, int(log2Steps))) + 4;
-    const auto low = (glm::i64vec3(glm::min(t.corner[0], glm::min(t.corner[1], t.corner[2]))) - margin) >>
+    const auto margin = int64_t(std::ldexp(marginCells_, int(log2Steps))) + 4;
+    const auto low = (glm::i64vec3(glm::min(corner[0], glm::min(corner[1], corner[2]))) - margin) >>
                      int64_t(log2Steps + grid.log2Cells);
-    const auto high = (glm::i64vec3(glm::max(t.corner[0], glm::max(t.corner[1], t.corner[2]))) + margin) >>
+    const auto high = (glm::i64vec3(glm::max(corner[0], glm::max(corner[1], corner[2]))) + margin) >>
                       int64_t(log2Steps + grid.log2Cells);
     const bool isOne = low == high && glm::all(glm::greaterThanEqual(low, glm::i64vec3(0))) &&
                        glm::all(glm::lessThanEqual(low, glm::i64vec3(grid.lastPage())));
     return isOne ? mortonEncode(glm::u32vec3(low)) : kNoPage;
 }
 
-const std::vector<size_t>& LevelSink::Batch::binsOf(const LatticeTriangle& t) {
-    const uint64_t around = pageAround(t);
+const std::vector<size_t>& BinsNear::of(const glm::i32vec3 (&corner)[3]) {
+    // Where one bin has all pages, no other needs to be looked for.
+    if (partition_.bins() == 1) return touched_;
+    const uint64_t around = pageAround(corner);
     if (around != kNoPage && around == page_) return touched_;
     page_ = kNoPage;
     if (around != kNoPage) {
-        const FinestPages& pages = sink_.pages_;
-        const size_t bin = sink_.partition_.binOf(pages.firstCode(pages.base(), around));
-        if (sink_.partition_.binOf(pages.firstCode(pages.base(), around + 1) - 1) == bin) {
+        const size_t bin = partition_.binOf(pages_.firstCode(pages_.base(), around));
+        if (partition_.binOf(pages_.firstCode(pages_.base(), around + 1) - 1) == bin) {
             page_ = around;
             touched_.assign(1, bin);
             return touched_;
@@ -42,16 +42,14 @@ const std::vector<size_t>& LevelSink::Batch::binsOf(const LatticeTriangle& t) {
     }
     // A triangle seldom spans more than two bins, so the list of those seen is short.
     touched_.clear();
-    sink_.pages_.forPagesNear(t.corner, sink_.marginCells_, [&](uint32_t level, uint64_t page) {
-        const size_t bin = sink_.partition_.binOf(sink_.pages_.firstCode(level, page));
+    pages_.forPagesNear(corner, marginCells_, [&](uint32_t level, uint64_t page) {
+        const size_t bin = partition_.binOf(pages_.firstCode(level, page));
         if (std::find(touched_.begin(), touched_.end(), bin) == touched_.end()) touched_.push_back(bin);
     });
     return touched_;
 }
 
 Result<void> LevelSink::Batch::add(const LatticeTriangle& t) {
-    // Where one bin has all pages, no other needs to be looked for.
-    if (sink_.partition_.bins() == 1) return batch_.add(0, t);
     for (const size_t bin : binsOf(t)) VCP_TRY(batch_.add(bin, t));
     return {};
 }

@@ -32,6 +32,29 @@ struct WaitingTriangle {
     uint32_t known;  ///< bit i: corner i's image is there
 };
 
+/// Finds which bins need a triangle. One thread.
+class BinsNear {
+public:
+    /// `partition`: by codes of the deepest of `pages`. `marginCells`: how far around a page it needs triangles.
+    BinsNear(const FinestPages& pages, const PagePartition& partition, double marginCells)
+        : pages_(pages), partition_(partition), marginCells_(marginCells), touched_{0} {}
+
+    /// Returns the bins; valid until the next call.
+    const std::vector<size_t>& of(const glm::i32vec3 (&corner)[3]);
+
+private:
+    /// Returns the page of the base level that the triangle lies in, and its margin, too; or kNoPage.
+    [[nodiscard]] uint64_t pageAround(const glm::i32vec3 (&corner)[3]) const;
+
+    static constexpr uint64_t kNoPage = ~uint64_t{0};
+    const FinestPages& pages_;
+    const PagePartition& partition_;
+    double marginCells_;
+    std::vector<size_t> touched_;
+    /// The last page that lay in one bin with all that is below it, which is the one in touched_.
+    uint64_t page_ = kNoPage;
+};
+
 /// Where the next level's triangles go: into every bin that needs them.
 class LevelSink {
 public:
@@ -43,22 +66,15 @@ public:
     /// Collects triangles; each thread has a batch of its own, and flushes it when done.
     class Batch {
     public:
-        explicit Batch(LevelSink& sink) : sink_(sink), batch_(sink.bins_) {}
+        explicit Batch(LevelSink& sink) : near_(sink.pages_, sink.partition_, sink.marginCells_), batch_(sink.bins_) {}
         Result<void> add(const LatticeTriangle& triangle);
         /// Returns the bins that a triangle goes into; valid until the next call.
-        const std::vector<size_t>& binsOf(const LatticeTriangle& triangle);
+        const std::vector<size_t>& binsOf(const LatticeTriangle& triangle) { return near_.of(triangle.corner); }
         Result<void> flush() { return batch_.flush(); }
 
     private:
-        /// Returns the page of the base level that the triangle lies in, and its margin, too; or kNoPage.
-        [[nodiscard]] uint64_t pageAround(const LatticeTriangle& triangle) const;
-
-        static constexpr uint64_t kNoPage = ~uint64_t{0};
-        LevelSink& sink_;
+        BinsNear near_;
         BinBatch<LatticeTriangle> batch_;
-        std::vector<size_t> touched_;
-        /// The last page that lay in one bin with all that is below it, which is the one in touched_.
-        uint64_t page_ = kNoPage;
     };
 
 private:

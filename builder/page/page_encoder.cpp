@@ -190,25 +190,37 @@ public:
     }
 
     std::vector<uint32_t> colours;
+    std::vector<TexturePoint> points;
+
+    /// Whether some triangle has an image.
+    [[nodiscard]] bool isTextured() const {
+        return std::ranges::any_of(points, [](const TexturePoint& point) { return point.material != 0; });
+    }
 
 private:
     static constexpr uint32_t kNone = 0xffffffff;
 
     uint32_t triangle(uint32_t global) {
         const auto& v = mesh_.triangles[global];
-        draft_.triangles.push_back({vertex(v[0]), vertex(v[1]), vertex(v[2])});
+        const auto place = mesh_.textures.empty() ? std::array<TexturePoint, 3>{} : mesh_.textures[global];
+        draft_.triangles.push_back({vertex(v[0], place[0]), vertex(v[1], place[1]), vertex(v[2], place[2])});
         return uint32_t(draft_.triangles.size() - 1);
     }
 
-    uint32_t vertex(uint32_t global) {
-        uint32_t& number = local_.findOrAdd(global);  // plus 1
+    /// Returns the number of a vertex: where triangles have it in different places of images, it is there for each.
+    uint32_t vertex(uint32_t global, const TexturePoint& place) {
+        uint32_t number = local_.findOrAdd(global);  // plus 1
+        const uint32_t first = number;
+        while (number != 0 && points[number - 1] != place) number = next_[number - 1];
         if (number == 0) {
             const glm::i32vec3 p = mesh_.positions[global] - tree_.originLattice + kLatticeBias;
             draft_.vertices.push_back(pack21(uint32_t(p.x), uint32_t(p.y), uint32_t(p.z)));
             if (withMarks_ && mesh_.parts[global] == kOpenPart) draft_.vertices.back().y |= kVertexOpenBit;
             draft_.normals.push_back(mesh_.normals[global]);
             if (!mesh_.colours.empty()) colours.push_back(mesh_.colours[global]);
-            number = uint32_t(draft_.vertices.size());
+            points.push_back(place);
+            next_.push_back(first);
+            number = local_.findOrAdd(global) = uint32_t(draft_.vertices.size());
         }
         return number - 1;
     }
@@ -218,7 +230,8 @@ private:
     bool withMarks_;
     PageDraft& draft_;
     std::vector<uint32_t> numbers_;  ///< of triangles, by local number
-    PositionMap<uint32_t> local_;
+    PositionMap<uint32_t> local_;    ///< the latest of the mesh's vertex, plus 1
+    std::vector<uint32_t> next_;     ///< the one before it, likewise; 0: none
 };
 
 /// Node words in breadth-first groups, so that children come after their parent.
@@ -325,10 +338,13 @@ EncodedPage encode(PageTree& tree, const LatticeMesh& mesh, bool withColour) {
     header.slabLeaves = page.slabLeaves;
     header.certifiedError = std::nextafter(float(page.certifiedError), std::numeric_limits<float>::infinity());
     if (withColour && page.leaves > 0) {
-        page.colour.resize(colourPageBytes(header));
+        const bool isTextured = triangles.isTextured();
+        page.colour.resize(isTextured ? texturedPageBytes(header) : colourPageBytes(header));
         copyTo(page.colour, 0, faces.colours);
         copyTo(page.colour, 16 * softFaces, slabs.colours);
         copyTo(page.colour, uint64_t{16} * header.faces, triangles.colours);
+        if (isTextured)
+            copyTo(page.colour, uint64_t{16} * header.faces + uint64_t{4} * header.vertices, triangles.points);
     }
     return page;
 }

@@ -9,6 +9,7 @@
 #include <xxhash.h>
 
 #include "builder/dataset_assembly.h"
+#include "builder/lattice/mesh_textures.h"
 #include "builder/level/vertex_step.h"
 #include "builder/slab_pages.h"
 
@@ -135,6 +136,27 @@ private:
     MeshParts meshParts_;
 };
 
+/// Returns what `deal` left of triangles with images; null where the file keeps none.
+Result<std::unique_ptr<RecordBins<TexturedTriangle>>> openTextures(const PartContext& context) {
+    std::unique_ptr<RecordBins<TexturedTriangle>> textures;
+    const auto recorded = context.recorded.files.bins.find("textures");
+    if (recorded == context.recorded.files.bins.end()) return textures;
+    textures = std::make_unique<RecordBins<TexturedTriangle>>(*context.dealt.space, "textures",
+                                                              context.levels.finest.bins(), 0);
+    if (recorded->second > 0) VCP_TRY(textures->raw().reopen(recorded->second));
+    return textures;
+}
+
+/// Opens the images that `deal` left; none where the file keeps none.
+Result<std::deque<PageSpool>> openImages(const PartContext& context) {
+    std::deque<PageSpool> images;
+    for (const auto& [bytes, entries] : context.recorded.files.images) {
+        images.emplace_back(*context.dealt.space, uint32_t(images.size()), "image");
+        if (bytes > 0) VCP_TRY(images.back().reopen(bytes, entries));
+    }
+    return images;
+}
+
 /// Whether all that lies below pages with one parent, of a level, belongs to a part.
 bool isWithin(const PartContext& context, unsigned part, int level, uint64_t parent) {
     const FinestPages& pages = context.levels.pages;
@@ -218,7 +240,7 @@ Result<PartContext> openContext(const std::filesystem::path& folder, const PartP
     levels.finest = PagePartition(recorded.partition);
     context.threads = threadsOf(plan.options);
     const uint64_t memory = plan.options.memoryBytes > 0 ? plan.options.memoryBytes : defaultMemoryBytes();
-    VCP_TRY_ASSIGN(context.memory, planMemory(memory, context.threads));
+    VCP_TRY_ASSIGN(context.memory, planMemory(memory, context.threads, plan.options.keepImages));
     VCP_TRY_ASSIGN(context.memory, planPages(context.memory, recorded.pages, levels.finest.bins()));
     levels.pageBytes = context.memory.pageBytes;
     context.hasColour = colourUseOf(plan.options, recorded.measures).any();
@@ -260,6 +282,7 @@ Result<void> runPages(const PartContext& context, unsigned number, NewPart& made
     std::deque<PageSpool> pages = makeSpools(space, levels.frame.levels, ""),
                           surfaces = makeSpools(space, levels.frame.levels, "surface"),
                           kept = makeSpools(space, levels.frame.levels, "kept");
+    VCP_TRY_ASSIGN(const auto textures, openTextures(context));
     const size_t first = context.firstBins[number], end = context.firstBins[number + 1];
     for (size_t bin = first; bin < end; ++bin) {
         const auto report = [&](double part) {
@@ -269,6 +292,10 @@ Result<void> runPages(const PartContext& context, unsigned number, NewPart& made
         if (soup.empty()) continue;
         LatticeMesh mesh = meshOf(soup, context.hasColour);
         std::vector<LatticeTriangle>().swap(soup);
+        if (textures) {
+            VCP_TRY_ASSIGN(auto known, textures->load(bin));
+            addTextures(mesh, std::move(known));
+        }
         VCP_TRY(buildBinPages(levels, mesh,
                               {.pass = levels.levels() - 1,
                                .first = levels.finest.first()[bin],
@@ -314,10 +341,12 @@ Result<BuildFigures> runMerge(const PartContext& context, NewPart& made) {
     FileHeader header = headerOf(levels, measures, context.hasColour, counts);
     OutputRules rules{.overwrite = context.plan.options.overwrite, .inputs = context.plan.options.inputs};
     for (const SideFile& each : context.recorded.sideFiles) rules.inputs.push_back(each.path);
+    VCP_TRY_ASSIGN(const auto images, openImages(context));
     BuildFigures figures;
-    VCP_TRY_ASSIGN(figures.fileBytes,
-                   assembleDataset(pages, header, context.plan.options.output, rules,
-                                   [&](double part) { return (*context.progress)(0.5 + part / 2); }));
+    VCP_TRY_ASSIGN(figures.fileBytes, assembleDataset(pages, header, context.plan.options.output, rules,
+                                                      images.empty() ? nullptr : &images.front(), [&](double part) {
+                                                          return (*context.progress)(0.5 + part / 2);
+                                                      }));
     describe(header, figures);
     return figures;
 }

@@ -51,6 +51,8 @@ public:
 
     [[nodiscard]] glm::uvec2 size() const { return {levels_[0].width, levels_[0].height}; }
     [[nodiscard]] uint64_t bytes() const;
+    /// The mip chain, the finest level first, down to a single texel.
+    [[nodiscard]] std::span<const Image> levels() const { return levels_; }
 
 private:
     /// Light and alpha, each texel weighted by its alpha.

@@ -45,13 +45,14 @@ PageSections pageSections(const PageHeader& header);
 
 /// Where a vertex of a hard leaf's triangles is in an image. All three vertices of a triangle have the same material.
 struct TexturePoint {
-    int32_t u = 0, v = 0;   ///< in 1/65536 of the image's width and height; (0, 0): its upper left corner, v downwards
+    int32_t u = 0, v = 0;   ///< in kTextureUnit of the image's width and height; (0, 0): its upper left corner, v downwards
     uint32_t material = 0;  ///< number of the material (octree/image/image_tables.h) plus 1; 0: none, u and v are 0
 
     bool operator==(const TexturePoint&) const = default;
 };
 static_assert(sizeof(TexturePoint) == 12);
-inline constexpr double kTextureUnit = 1.0 / 65536;
+inline constexpr int kLog2TextureUnit = -20;
+inline constexpr double kTextureUnit = 1.0 / (1 << -kLog2TextureUnit);
 
 /// Returns the bytes of the colour page that belongs to a page; of one that has a TexturePoint for each vertex, too.
 uint64_t colourPageBytes(const PageHeader& header);

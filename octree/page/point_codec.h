@@ -90,7 +90,7 @@ private:
                 if (point.material == material) any |= uint32_t(point.u) | uint32_t(point.v);
             shift = uint32_t(std::countr_zero(any));
         }
-        coder_.raw(shift, 4);
+        coder_.raw(shift, 5);
         at->second.shift = shift;
         return at->second;
     }
@@ -175,7 +175,7 @@ private:
         more = small;
     }
 
-    static constexpr uint32_t kMostShift = 15;
+    static constexpr uint32_t kMostShift = 20;
     static constexpr double kFar = 64;
     static constexpr size_t kSizes = 4;
 

@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "octree/image/image_set.h"
+#include "octree/dataset_reader.h"
 #include "octree/vcp_verify.h"
 #include "tests/support/image_file.h"
 #include "tests/support/test_folder.h"
@@ -93,7 +94,7 @@ protected:
         EXPECT_EQ(tables.error().file, "memory.vcp");
     }
 
-    test::TestFolder folder_;
+    TestFolder folder_{"vcp_images"};
     std::vector<LevelledImage> images_;
     StoredImages stored_;
     std::vector<std::byte> bytes_;
