@@ -34,10 +34,13 @@ Result<std::unique_ptr<HostRenderer>> HostRenderer::create(const RendererOptions
 
 Result<void> HostRenderer::open(std::vector<PlacedDataset> datasets, std::span<const MesoSurface> surfaces) {
     datasets_.clear();
+    images_.clear();
     VCP_TRY(takeSurfaces(surfaces));
     const auto openAll = [&]() -> Result<void> {
         for (const PlacedDataset& placed : datasets) VCP_TRY(checkHostDraws(*placed.dataset, placed.source->name()));
+        VCP_TRY(readImages(datasets));
         RendererOptions left = options_;
+        for (const auto& images : images_) left.ramBytes -= images ? images->bytes() : 0;
         VCP_TRY_ASSIGN(left.budgetBytes, budgetOfPages(options_.budgetBytes, bytesOf(prepared_)));
         VCP_TRY_ASSIGN(datasets_, openResidencies(hostPageMemory(), left, std::move(datasets)));
         return {};
@@ -47,6 +50,18 @@ Result<void> HostRenderer::open(std::vector<PlacedDataset> datasets, std::span<c
         return opened;
     }
     errorPixels_.assign(datasets_.size(), std::numeric_limits<double>::infinity());
+    return {};
+}
+
+/// Images take at most half of the memory for pages on their way, all datasets together.
+Result<void> HostRenderer::readImages(std::span<const PlacedDataset> datasets) {
+    images_.assign(datasets.size(), nullptr);
+    uint64_t left = options_.ramBytes / 2;
+    for (size_t i = 0; i < datasets.size(); ++i) {
+        if (!options_.colour || !datasets[i].dataset->hasImages()) continue;
+        VCP_TRY_ASSIGN(images_[i], datasets[i].source->readImages(left));
+        left -= images_[i] ? std::min(images_[i]->bytes(), left) : 0;
+    }
     return {};
 }
 
@@ -113,7 +128,11 @@ std::vector<HostDataset> HostRenderer::drawn(const FrameRequest& request) const 
     std::vector<HostDataset> drawn;
     for (size_t i = 0; i < datasets_.size(); ++i)
         if (!isHidden(request, i))
-            drawn.push_back({*datasets_[i].residency, datasets_[i].placement, uint32_t(i), errorPixels_[i]});
+            drawn.push_back({.residency = *datasets_[i].residency,
+                             .placement = datasets_[i].placement,
+                             .number = uint32_t(i),
+                             .errorPixels = errorPixels_[i],
+                             .images = images_[i].get()});
     return drawn;
 }
 

@@ -124,6 +124,12 @@ uint32_t FilePageSource::pageRunFrom(uint64_t first, uint32_t most, bool withCol
     return count;
 }
 
+Result<std::shared_ptr<const ImageSet>> FilePageSource::readImages(uint64_t mostBytes) const {
+    if (!dataset_->hasImages()) return std::shared_ptr<const ImageSet>();
+    VCP_TRY_ASSIGN(auto images, ImageSet::read(*reader_, dataset_->header.images, mostBytes));
+    return std::shared_ptr<const ImageSet>(std::make_shared<const ImageSet>(std::move(images)));
+}
+
 uint64_t FilePageSource::bytesToRead(Request request, bool withColour) const {
     if (!request.isPage()) return kBlockBytes;
     const PageEntry& entry = dataset_->pages[request.number];

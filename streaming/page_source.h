@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "octree/image/image_set.h"
 #include "octree/page_reader.h"
 #include "streaming/request.h"
 #include "streaming/stored_pages.h"
@@ -41,6 +42,10 @@ public:
     [[nodiscard]] virtual uint32_t partOf([[maybe_unused]] Request request) const { return 0; }
     /// Ends reads that are under way soon, with Cancelled, where they could take long. Later reads work.
     virtual void interrupt() const {}
+    /// Reads the images of the pages' file, as ImageSet::read does; null where it has none.
+    virtual Result<std::shared_ptr<const ImageSet>> readImages([[maybe_unused]] uint64_t mostBytes) const {
+        return std::shared_ptr<const ImageSet>();
+    }
     /// The name of the pages' file, for errors; empty where there is none, or several.
     [[nodiscard]] virtual std::string name() const { return {}; }
     [[nodiscard]] virtual PageOrigin originOf(Request request) const { return {name(), request}; }
@@ -61,6 +66,7 @@ public:
     [[nodiscard]] uint64_t bytesToRead(Request request, bool withColour) const override;
     uint64_t keepWithin(uint64_t bytes) const override { return kept_.limitTo(bytes); }
     void interrupt() const override { reader_->interrupt(); }
+    Result<std::shared_ptr<const ImageSet>> readImages(uint64_t mostBytes) const override;
     [[nodiscard]] std::string name() const override { return reader_->name(); }
 
 private:

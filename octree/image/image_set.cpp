@@ -34,14 +34,18 @@ Result<ImageSet> ImageSet::read(const ByteReader& reader, const ImagesPlace& pla
         const ImageRow& row = tables.images[i];
         Image& image = set.images_.emplace_back(Image{row.width, row.height, finest[i], {}});
         const auto levels = imageLevels(row.width, row.height, row.firstTile);
-        for (const ImageLevel& level : std::span(levels).subspan(finest[i])) {
+        // The coarse levels come first, so that those which are kept lie together.
+        const auto kept = std::span(levels).subspan(finest[i]);
+        VCP_TRY_ASSIGN(const auto stored, readTiles(reader, tables, row.firstTile,
+                                                    kept.front().firstTile + kept.front().tiles() - row.firstTile));
+        for (const ImageLevel& level : kept) {
             const uint64_t first = set.texels_.size();
             image.levels.push_back({level.width, level.height, first});
             set.texels_.resize(first + level.texels());
             uint64_t number = level.firstTile;
             for (const glm::uvec2 tile : tileOrder(level)) {
                 const glm::uvec2 size = level.sizeOf(tile);
-                VCP_TRY(readTile(reader, tables, number++, size, texels));
+                VCP_TRY(decodeTile(reader.name(), tables, stored, number++, size, texels));
                 for (uint32_t y = 0; y < size.y; ++y)
                     std::copy_n(texels.begin() + std::ptrdiff_t(size_t{y} * size.x), size.x,
                                 set.texels_.begin() +

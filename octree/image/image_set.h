@@ -24,7 +24,7 @@ public:
     };
 
     /// Reads all images. Where they take more than `mostBytes`, the finest levels of the largest ones are left out; the
-    /// coarsest level of each is always there. Errors: readImageTables' and readTile's.
+    /// coarsest level of each is always there. Errors: readImageTables' and decodeTile's.
     static Result<ImageSet> read(const ByteReader& reader, const ImagesPlace& place, uint64_t mostBytes);
 
     [[nodiscard]] std::span<const Image> images() const { return images_; }

@@ -139,13 +139,22 @@ Result<ImageTables> readImageTables(const ByteReader& reader, const ImagesPlace&
     return TableCheck(reader, place).run();
 }
 
-Result<void> readTile(const ByteReader& reader, const ImageTables& tables, uint64_t number, glm::uvec2 size,
-                      std::span<uint32_t> texels) {
+Result<StoredTiles> readTiles(const ByteReader& reader, const ImageTables& tables, uint64_t first, uint64_t count) {
+    StoredTiles tiles{first, {}};
+    if (count == 0) return tiles;
+    const TileRow& last = tables.tiles[first + count - 1];
+    const uint64_t begin = tables.tiles[first].offset;
+    tiles.bytes.resize(last.offset + last.storedBytes - begin);
+    VCP_TRY(reader.read(begin, tiles.bytes));
+    return tiles;
+}
+
+Result<void> decodeTile(const std::string& file, const ImageTables& tables, const StoredTiles& tiles, uint64_t number,
+                        glm::uvec2 size, std::span<uint32_t> texels) {
     const TileRow& row = tables.tiles[number];
-    std::vector<std::byte> bytes(row.storedBytes);
-    VCP_TRY(reader.read(row.offset, bytes));
+    const auto bytes = std::span(tiles.bytes).subspan(row.offset - tables.tiles[tiles.first].offset, row.storedBytes);
     const auto fail = [&](std::string message) {
-        return brokenBytes(reader.name(), fmt::format("tile {}", number), row.offset, std::move(message));
+        return brokenBytes(file, fmt::format("tile {}", number), row.offset, std::move(message));
     };
     if (hashBytes(bytes) != row.hash) return fail("its hash does not match: the file was changed or damaged");
     if (const auto done = unpackTile(bytes, size, texels); !done) return fail(done.error().message);
@@ -160,7 +169,8 @@ Result<void> verifyImages(const ByteReader& reader, const ImagesPlace& place,
         for (const ImageLevel& level : imageLevels(image.width, image.height, image.firstTile)) {
             uint64_t number = level.firstTile;
             for (const glm::uvec2 tile : tileOrder(level)) {
-                VCP_TRY(readTile(reader, tables, number, level.sizeOf(tile), texels));
+                VCP_TRY_ASSIGN(const auto stored, readTiles(reader, tables, number, 1));
+                VCP_TRY(decodeTile(reader.name(), tables, stored, number, level.sizeOf(tile), texels));
                 const TileRow& row = tables.tiles[number++];
                 if (!progress(row.offset + row.storedBytes)) return Error::cancelled(reader.name());
             }

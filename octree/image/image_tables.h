@@ -73,10 +73,18 @@ std::string wrongPlace(const ImagesPlace& place, uint64_t begin, uint64_t end);
 /// the section has bytes. Errors: InvalidInput (with file and byte), Io.
 Result<ImageTables> readImageTables(const ByteReader& reader, const ImagesPlace& place);
 
-/// Reads a tile, checks its hash and decodes it. `number`: in the table; `size`: its texels along both axes; `texels`:
-/// room for them. Errors: InvalidInput, Io. Any thread.
-Result<void> readTile(const ByteReader& reader, const ImageTables& tables, uint64_t number, glm::uvec2 size,
-                      std::span<uint32_t> texels);
+/// Reads the stored bytes of all tiles of some levels of an image, which follow each other, in one read. They are valid
+/// as long as `bytes`. Errors: Io.
+struct StoredTiles {
+    uint64_t first = 0;  ///< number of the first tile
+    std::vector<std::byte> bytes;
+};
+Result<StoredTiles> readTiles(const ByteReader& reader, const ImageTables& tables, uint64_t first, uint64_t count);
+
+/// Checks the hash of one of the tiles that were read, and decodes it. `file`: its name, for errors; `number`: in the
+/// table; `size`: its texels along both axes; `texels`: room for them. Errors: InvalidInput. Any thread.
+Result<void> decodeTile(const std::string& file, const ImageTables& tables, const StoredTiles& tiles, uint64_t number,
+                        glm::uvec2 size, std::span<uint32_t> texels);
 
 /// Reads and checks the section: its tables, and each tile. `progress` is called with the bytes up to where the file is
 /// checked; false cancels. Errors: InvalidInput, Io, Cancelled.

@@ -155,11 +155,12 @@ private:
     }
 
     void keep(const TileHits& hits, const TileSurface& surface) {
+        HitColours colours(layer_.scene, hits);
         forEachHit(hits, [&](glm::ivec2 pixel, int i) {
             const size_t to = at(pixel);
             planes_->depth[to] = tiles_.depthInCells(hits.depth[i]);
             planes_->normals[to] = surface.normal(i);
-            if (tiles_.isColoured()) planes_->albedo[to] = glm::packUnorm4x8(colourAt(layer_.scene, hits, i));
+            if (tiles_.isColoured()) planes_->albedo[to] = tiles_.colourOf(colours, hits, pixel, i);
             planes_->sun[to] = toByte(surface.sun[i]);
             planes_->sky[to] = toByte(surface.sky[i]);
             planes_->hits[to] = tiles_.hitOf(hits, i);

@@ -9,6 +9,7 @@
 
 #include <glm/vec3.hpp>
 
+#include "octree/image/image_set.h"
 #include "octree/page/page.h"
 #include "octree/reference_caster.h"
 
@@ -64,6 +65,11 @@ public:
     };
     using Node = std::array<Child, 8>;  ///< child i at octant x + 2y + 4z
 
+    /// Lets triangles that have images be seen in them, and not in the colours of their vertices. `images`: the file's,
+    /// of which pages were checked to name no other materials; null: none. It must outlive the scene.
+    void showImages(const ImageSet* images) { images_ = images; }
+    [[nodiscard]] const ImageSet* images() const { return images_; }
+
     [[nodiscard]] const HostGrid& grid() const { return grid_; }
     [[nodiscard]] Child root() const { return root_; }
     [[nodiscard]] uint32_t rootBits() const;  ///< log2 of the root's edge in subcells
@@ -79,6 +85,7 @@ private:
     Result<void> add(const HostPage& page);
 
     HostGrid grid_;
+    const ImageSet* images_ = nullptr;
     Child root_;
     std::vector<Node> nodes_;
     std::vector<Page> pages_;

@@ -121,14 +121,21 @@ void LayerTiles::markPages(const TileHits& hits) const {
 void LayerTiles::findAlbedo(const TileHits& hits, TileSurface& surface) const {
     setClay(surface);
     if (!isColoured_ && hits.onCap.none()) return;
-    forEachPixel(size_, hits.corner, [&](glm::ivec2, int i) {
+    HitColours colours(layer_.scene, hits);
+    forEachPixel(size_, hits.corner, [&](glm::ivec2 pixel, int i) {
         if (!std::isfinite(hits.depth[i])) return;
         // Colours have 8 bits between the passes of a device, too.
         if (hits.onCap[size_t(i)])
             setAlbedo(surface, i, layer_.frame.cap);
         else if (isColoured_)
-            setAlbedo(surface, i, glm::unpackUnorm4x8(glm::packUnorm4x8(colourAt(layer_.scene, hits, i))));
+            setAlbedo(surface, i, glm::unpackUnorm4x8(colourOf(colours, hits, pixel, i)));
     });
+}
+
+uint32_t LayerTiles::colourOf(HitColours& colours, const TileHits& hits, glm::ivec2 pixel, int i) const {
+    if (layer_.scene.images() == nullptr) return glm::packUnorm4x8(colourAt(layer_.scene, hits, i));
+    return glm::packUnorm4x8(
+        colours.at(i, glm::vec3(rayOf(pixel).direction), pixelEdgeAt(depthInCells(hits.depth[i]))));
 }
 
 void LayerTiles::setClay(TileSurface& surface) const {

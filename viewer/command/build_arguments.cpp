@@ -50,6 +50,7 @@ void addBuildSettings(CLI::App& app, BuildOptions& options, const char* group) {
     addCell(app, options.cell);
     addError(app, options);
     addColourChoice(app, options);
+    addImages(app, options);
     addParsed(app, "--leaves", options.coarseLeaves, leavesNamed, "slabs or mesh",
               "What coarser levels are made of: slabs (one plane a cell) or mesh (triangles of clustered vertices, and "
               "vectors at corners where they suffice; always with --error)")
@@ -80,6 +81,13 @@ void addColourChoice(CLI::App& app, BuildOptions& options) {
               "Colour to keep: auto (all there is), vertex, texture or none")
         ->type_name("WHICH:{auto,vertex,texture,none}")
         ->default_str("auto");
+}
+
+void addImages(CLI::App& app, BuildOptions& options) {
+    app.add_flag(
+        "--images", options.keepImages,
+        "Keep the images of materials, too, as sharp as they are, with their place on the triangles; so far only "
+        "`--device host` draws from them");
 }
 
 void addFormat(CLI::App& app, BuildOptions& options) {

@@ -19,6 +19,7 @@ void addBuildSettings(CLI::App& app, BuildOptions& options, const char* group);
 void addBuildInputs(CLI::App& app, std::vector<std::string>& inputs, const std::string& description);
 void addBuildOutput(CLI::App& app, std::string& output);
 void addColourChoice(CLI::App& app, BuildOptions& options);
+void addImages(CLI::App& app, BuildOptions& options);
 void addFormat(CLI::App& app, BuildOptions& options);
 void addTempFolder(CLI::App& app, BuildOptions& options, const std::string& description);
 

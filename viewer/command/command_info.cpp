@@ -82,6 +82,9 @@ Json toJson(const std::string& file, const Dataset& dataset) {
             {"colour", dataset.hasColour()},
             {"geometry_stored_bytes", bytes.geometry},
             {"colour_stored_bytes", bytes.colour},
+            {"images", h.images.images},
+            {"materials", h.images.materials},
+            {"images_stored_bytes", h.images.bytes},
             {"bounds_min", Json::array({h.boundsMin[0], h.boundsMin[1], h.boundsMin[2]})},
             {"bounds_max", Json::array({h.boundsMax[0], h.boundsMax[1], h.boundsMax[2]})},
             {"origin", Json::array({h.origin[0], h.origin[1], h.origin[2]})},
@@ -113,8 +116,13 @@ std::string partsLine(const FileHeader& h) {
 
 std::string bytesLine(const Dataset& dataset) {
     const StoredBytes bytes = storedBytesOf(dataset);
-    return fmt::format("  stored      {} of geometry, {} of colour\n", formatBytes(bytes.geometry),
-                       formatBytes(bytes.colour));
+    std::string line = fmt::format("  stored      {} of geometry, {} of colour", formatBytes(bytes.geometry),
+                                   formatBytes(bytes.colour));
+    const ImagesPlace& images = dataset.header.images;
+    if (dataset.hasImages())
+        line += fmt::format(", {} of {} in {}", formatBytes(images.bytes), formatCount(images.images, "image"),
+                            formatCount(images.materials, "material"));
+    return line + '\n';
 }
 
 std::string summary(const std::string& file, const Dataset& dataset) {

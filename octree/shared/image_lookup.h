@@ -1,0 +1,89 @@
+// How an image is read at a point of a triangle: which of its texels a pixel covers there. Compiles as GLSL (Real =
+// float) and as C++ in float and double (octree/surface/image_lookup.h), after leaf_math.h. Only the common subset of
+// GLSL and GLM is used.
+//
+// A pixel's footprint is an ellipse on the surface, and in the image. It is filtered at several places along it, each
+// from the two levels whose texels are as wide as it is (McCormack et al. 1999, "Feline"; Williams 1983).
+
+const uint kWrapRepeat = 0u;
+const uint kWrapClamp = 1u;
+const uint kWrapMirror = 2u;
+
+// Returns the texel that is shown at place `at` of a row of `size` texels. |at| < 2^24.
+INLINE int wrappedTexel(int at, int size, uint wrap) {
+    if (wrap == kWrapClamp) return clamp(at, 0, size - 1);
+    int period = wrap == kWrapMirror ? 2 * size : size;
+    int inside = at - period * int(floor(Real(at) / Real(period)));
+    // Rounding may leave it a period away.
+    inside = inside < 0 ? inside + period : inside >= period ? inside - period : inside;
+    return inside < size ? inside : period - 1 - inside;
+}
+
+// How the coordinates of a triangle in an image change along the axes of space.
+struct TextureSlope {
+    Real3 u;
+    Real3 v;
+};
+
+// `a`, `b`, `c`: the triangle's corners; `toB`, `toC`: the coordinates of b and c, less those of a.
+INLINE TextureSlope textureSlope(Real3 a, Real3 b, Real3 c, Real2 toB, Real2 toC) {
+    Real3 n = cross(b - a, c - a);
+    Real scale = Real(1.0) / max(dot(n, n), Real(1e-30));
+    Real3 alongB = cross(c - a, n) * scale;
+    Real3 alongC = cross(n, b - a) * scale;
+    TextureSlope slope;
+    slope.u = alongB * toB.x + alongC * toC.x;
+    slope.v = alongB * toB.y + alongC * toC.y;
+    return slope;
+}
+
+// A footprint in an image. `along`: its length as a step of coordinates; `length`, `width`: in texels.
+struct ImageFootprint {
+    Real2 along;
+    Real length;
+    Real width;
+};
+
+// Surfaces that are seen more from the side than this are filtered as if they were not.
+const float kLeastCosine = 0.05f;
+const int kMostFootprintPlaces = 8;
+
+// `n`: the triangle's normal, `direction`: of the ray, both unit; `pixelEdge`: of a pixel at the hit, in the units of
+// the slope; `size`: of the image, texels.
+INLINE ImageFootprint imageFootprint(TextureSlope slope, Real3 n, Real3 direction, Real pixelEdge, Real2 size) {
+    Real3 across = cross(direction, n);
+    if (dot(across, across) < Real(1e-6))
+        across = abs(n.z) < Real(0.7) ? Real3(n.y, -n.x, Real(0.0)) : Real3(Real(0.0), n.z, -n.y);
+    across = normalize(across);
+    Real3 away = cross(n, across);
+    Real stretched = pixelEdge / max(abs(dot(direction, n)), Real(kLeastCosine));
+    Real2 a = size * Real2(dot(slope.u, across), dot(slope.v, across)) * pixelEdge;
+    Real2 b = size * Real2(dot(slope.u, away), dot(slope.v, away)) * stretched;
+    // The axes of the ellipse, from the matrix a a^T + b b^T.
+    Real xx = a.x * a.x + b.x * b.x;
+    Real xy = a.x * a.y + b.x * b.y;
+    Real yy = a.y * a.y + b.y * b.y;
+    Real mean = (xx + yy) * Real(0.5);
+    Real difference = (xx - yy) * Real(0.5);
+    Real apart = sqrt(difference * difference + xy * xy);
+    Real longest = sqrt(mean + apart);
+    // Of the two ways to write the direction, the one that does not cancel.
+    Real2 towards = xx > yy ? Real2(difference + apart, xy) : Real2(xy, apart - difference);
+    Real scale = longest / sqrt(max(dot(towards, towards), Real(1e-30)));
+    ImageFootprint footprint;
+    footprint.along = towards * scale / size;
+    footprint.length = longest;
+    footprint.width = sqrt(max(mean - apart, Real(0.0)));
+    return footprint;
+}
+
+// Returns at how many places along a footprint the image is read.
+INLINE int footprintPlaces(ImageFootprint footprint) {
+    Real ratio = footprint.length / max(footprint.width, Real(1.0));
+    return int(clamp(floor(ratio + Real(0.5)), Real(1.0), Real(float(kMostFootprintPlaces))));
+}
+
+// Returns the level that suits each of so many places, 0 or more; its fraction is the share of the next coarser one.
+INLINE Real footprintLevel(ImageFootprint footprint, int places) {
+    return log2(max(max(footprint.width, footprint.length / Real(places)), Real(1.0)));
+}

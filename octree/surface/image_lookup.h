@@ -1,0 +1,18 @@
+// The shared lookup of images (octree/shared/image_lookup.h) in C++.
+#pragma once
+
+#include "octree/surface/leaf_math.h"
+
+namespace vcp {
+
+#define INLINE inline
+namespace f32 {
+#include "octree/shared/image_lookup.h"
+}  // namespace f32
+
+namespace f64 {
+#include "octree/shared/image_lookup.h"
+}  // namespace f64
+#undef INLINE
+
+}  // namespace vcp

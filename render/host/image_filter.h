@@ -1,0 +1,24 @@
+// Reads images of a file with a filter (octree/shared/image_lookup.h), in linear light.
+#pragma once
+
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+#include <glm/vec4.hpp>
+
+#include "octree/image/image_set.h"
+#include "octree/surface/image_lookup.h"
+
+namespace vcp {
+
+/// How an image goes on beyond its edges.
+struct ImageWraps {
+    uint32_t u = f32::kWrapRepeat, v = f32::kWrapRepeat;
+};
+
+/// Returns the mean over a footprint about `at`, in coordinates of the image ((0, 0): its upper left corner): encoded
+/// for the screen and with alpha, 0 to 1. What is transparent lends no colour; where all is, it is 0. |at| times the
+/// image's size is below 2^23. Any thread.
+glm::vec4 filteredColour(const ImageSet& set, const ImageSet::Image& image, ImageWraps wraps, glm::vec2 at,
+                         const f32::ImageFootprint& footprint);
+
+}  // namespace vcp
