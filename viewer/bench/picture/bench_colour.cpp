@@ -172,7 +172,7 @@ private:
         };
         VCP_TRY_ASSIGN(const auto model, loadBenchModel(
                                              path, folder_.path(), o_.cell, o_.threads,
-                                             [&](const std::string& what) { return report(what); }, load));
+                                             [&](const std::string& what) { return report(what); }, load, o_.images));
         if (!paint.hasColour())
             return Error{.code = ErrorCode::Usage,
                          .message = "has no colour to compare; name a mesh with colours or textures",
@@ -224,6 +224,7 @@ private:
                 methods.back()->geometryBytes += page.storedBytes;
                 methods.back()->colourBytes += page.colourStoredBytes;
             }
+            methods.back()->colourBytes += model.cache->dataset().header.images.bytes;
         }
         return {};
     }

@@ -38,7 +38,7 @@ Result<std::unique_ptr<SettledDrawing>> SettledDrawing::create(std::filesystem::
     RendererOptions made;
     made.device = options.device;
     made.budgetBytes = uint64_t{2} << 30;
-    VCP_TRY_ASSIGN(auto renderer, Renderer::create(made));
+    VCP_TRY_ASSIGN(auto renderer, createPictureRenderer(made));
     return std::unique_ptr<SettledDrawing>(new SettledDrawing(std::move(renderer), std::move(file), options));
 }
 
@@ -52,7 +52,7 @@ Result<void> SettledDrawing::startAnew() {
     reader_ = std::make_shared<CountingReader>(file);
     VCP_TRY_ASSIGN(auto dataset, readDataset(*reader_));
     const auto shared = std::make_shared<const Dataset>(std::move(dataset));
-    return renderer_->open(shared, std::make_shared<FilePageSource>(reader_, shared));
+    return renderer_->open({{.dataset = shared, .source = std::make_shared<FilePageSource>(reader_, shared)}}, {});
 }
 
 Result<PictureCost> SettledDrawing::draw(FrameRequest request) {

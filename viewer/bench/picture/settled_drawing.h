@@ -10,7 +10,7 @@
 #include "builder/measure/quantile.h"
 #include "octree/io/result.h"
 #include "render/frame_request.h"
-#include "render/view/renderer.h"
+#include "render/picture_renderer.h"
 
 namespace vcp {
 
@@ -48,24 +48,24 @@ public:
         int repetitions = 3;   ///< frames whose median processor time is reported
     };
 
-    /// Errors: those of Renderer::create.
+    /// Errors: those of createPictureRenderer.
     static Result<std::unique_ptr<SettledDrawing>> create(std::filesystem::path file, const Options& options);
 
     /// The error, and the samples where there are several.
     [[nodiscard]] std::string knob() const;
     [[nodiscard]] const std::string& device() const { return renderer_->device().name; }
 
-    /// Forgets what was read, and opens the file. Errors: those of readDataset and of Renderer::open.
+    /// Forgets what was read, and opens the file. Errors: those of readDataset and of PictureRenderer::open.
     Result<void> startAnew();
     /// Draws the request at the options' error, until settled; renderer() then has the picture.
     Result<PictureCost> draw(FrameRequest request);
-    [[nodiscard]] Renderer& renderer() { return *renderer_; }
+    [[nodiscard]] PictureRenderer& renderer() { return *renderer_; }
 
 private:
-    SettledDrawing(std::unique_ptr<Renderer> renderer, std::filesystem::path file, const Options& options)
+    SettledDrawing(std::unique_ptr<PictureRenderer> renderer, std::filesystem::path file, const Options& options)
         : renderer_(std::move(renderer)), file_(std::move(file)), options_(options) {}
 
-    std::unique_ptr<Renderer> renderer_;
+    std::unique_ptr<PictureRenderer> renderer_;
     std::filesystem::path file_;
     Options options_;
     std::shared_ptr<CountingReader> reader_;

@@ -11,11 +11,13 @@ namespace vcp {
 
 namespace {
 
-/// Names the files: datasets of one mesh with several cells have several names. `cell` 0: chosen from the mesh.
-Result<ModelFiles> filesOf(const std::filesystem::path& model, const std::filesystem::path& folder, double cell) {
+/// Names the files: datasets of one mesh with several cells, and those with images, have names of their own. `cell` 0:
+/// chosen from the mesh.
+Result<ModelFiles> filesOf(const std::filesystem::path& model, const std::filesystem::path& folder, double cell,
+                           bool withImages) {
     if (model.extension() != ".vcp") {
-        const std::string name = model.stem().string();
-        return ModelFiles{model, folder / (cell > 0 ? fmt::format("{}-cell-{}.vcp", name, cell) : name + ".vcp"), name};
+        const std::string name = model.stem().string(), kind = name + (withImages ? "-images" : "");
+        return ModelFiles{model, folder / (cell > 0 ? fmt::format("{}-cell-{}.vcp", kind, cell) : kind + ".vcp"), name};
     }
     for (const char* extension : {".ply", ".obj", ".stl", ".gltf", ".glb"}) {
         std::filesystem::path mesh = model;
@@ -41,8 +43,8 @@ Result<void> checkNames(const std::vector<std::string>& wanted, const std::vecto
 Result<std::unique_ptr<BenchModel>> loadBenchModel(const std::filesystem::path& path,
                                                    const std::filesystem::path& folder, double cell, unsigned threads,
                                                    const std::function<Result<void>(const std::string& what)>& report,
-                                                   const LoadOptions& load) {
-    VCP_TRY_ASSIGN(auto files, filesOf(path, folder, cell));
+                                                   const LoadOptions& load, bool withImages) {
+    VCP_TRY_ASSIGN(auto files, filesOf(path, folder, cell, withImages));
     auto model = std::make_unique<BenchModel>();
     model->files = files;
     VCP_TRY(report(fmt::format("{}: reading the mesh", files.name)));
@@ -55,6 +57,7 @@ Result<std::unique_ptr<BenchModel>> loadBenchModel(const std::filesystem::path& 
         build.output = files.vcp;
         build.cell = cell;
         build.threads = threads;
+        build.keepImages = withImages;
         VCP_TRY(buildOctree(build));
     }
     VCP_TRY_ASSIGN(auto cache, PageCache::open(files.vcp));

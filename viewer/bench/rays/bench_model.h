@@ -28,12 +28,13 @@ struct BenchModel {
 };
 
 /// Loads a mesh and builds its .vcp in `folder`, unless it is there; of a .vcp, the mesh of the same name beside it.
-/// `cell` 0: chosen from the mesh. `report` hears what is being done. `load`: how the mesh is read. Errors: Usage,
-/// where no mesh is beside a .vcp; those of loadMesh, buildOctree, PageCache::open and `report`.
+/// `cell` 0: chosen from the mesh; `withImages`: as of vcp build. `report` hears what is being done. `load`: how the
+/// mesh is read. Errors: Usage, where no mesh is beside a .vcp; those of loadMesh, buildOctree, PageCache::open and
+/// `report`.
 Result<std::unique_ptr<BenchModel>> loadBenchModel(const std::filesystem::path& model,
                                                    const std::filesystem::path& folder, double cell, unsigned threads,
                                                    const std::function<Result<void>(const std::string& what)>& report,
-                                                   const LoadOptions& load = {});
+                                                   const LoadOptions& load = {}, bool withImages = false);
 
 /// Checks that all names that were asked for are known. `kind`: "camera". Errors: Usage.
 Result<void> checkNames(const std::vector<std::string>& wanted, const std::vector<std::string>& known,

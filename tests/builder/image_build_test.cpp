@@ -1,0 +1,202 @@
+// Files that keep images: what is in them of a mesh whose coordinates are known everywhere; the same bytes however they
+// are built; and what becomes of images that are not there.
+#include <cmath>
+#include <fstream>
+#include <map>
+
+#include <gtest/gtest.h>
+
+#include "builder/build.h"
+#include "builder/parts/build_parts.h"
+#include "builder/texture/texture.h"
+#include "octree/image/image_set.h"
+#include "octree/reference_caster.h"
+#include "octree/surface/packing.h"
+#include "octree/vcp_verify.h"
+#include "tests/support/mesh_files.h"
+#include "tests/support/test_folder.h"
+#include "tests/support/test_meshes.h"
+#include "tests/support/textured_walls.h"
+
+namespace vcp {
+namespace {
+
+namespace fs = std::filesystem;
+using test::TexturedWalls;
+
+class ImageBuild : public ::testing::Test {
+protected:
+    void SetUp() override { writeWalls(false); }
+    void writeWalls(bool backwards) const {
+        TexturedWalls::write(
+            folder_.path(), [](uint32_t x, uint32_t y) { return x * 2 | y * 5 << 8 | (x + y) << 16; },
+            [](uint32_t x, uint32_t y) { return (x / 4 + y / 4) % 2 == 0 ? 0xffffffu : 0x4060u; }, backwards);
+    }
+    [[nodiscard]] BuildOptions options() const {
+        BuildOptions o;
+        o.inputs = {folder_ / "walls.obj"};
+        o.output = output();
+        o.cell = 0.06;
+        o.threads = 2;
+        o.overwrite = true;
+        o.keepImages = true;
+        return o;
+    }
+    [[nodiscard]] fs::path output() const { return folder_ / "walls.vcp"; }
+    [[nodiscard]] std::string built(const BuildOptions& options) const {
+        const auto report = buildOctree(options);
+        EXPECT_TRUE(report.ok()) << report.error().line();
+        return report ? contentOf(output()) : std::string();
+    }
+
+    TestFolder folder_{"vcp_image_build"};
+};
+
+TEST_F(ImageBuild, KeepsImagesAndWhereTheyLie) {
+    ASSERT_FALSE(built(options()).empty());
+    const auto file = openFile(output());
+    ASSERT_TRUE(verifyFile(**file).ok()) << verifyFile(**file).error().line();
+    auto cache = PageCache::open(output());
+    ASSERT_TRUE(cache.ok() && cache->loadAll().ok());
+    const Dataset& dataset = cache->dataset();
+    const FileHeader& h = dataset.header;
+    EXPECT_EQ(h.version, kImagesFileVersion);
+    EXPECT_EQ(h.images.images, 2u);
+    EXPECT_EQ(h.images.materials, 2u);
+    // Each image's levels are those that colours were filtered from.
+    const auto set = ImageSet::read(**file, h.images, ~uint64_t{0});
+    ASSERT_TRUE(set.ok());
+    const char* names[] = {"floor.png", "wall.png"};
+    for (size_t i = 0; i < 2; ++i) {
+        const Texture texture(*loadImage({folder_ / names[i], nullptr}));
+        ASSERT_EQ(set->images()[i].levels.size(), texture.levels().size());
+        for (size_t l = 0; l < texture.levels().size(); ++l)
+            EXPECT_TRUE(std::equal(texture.levels()[l].texels.begin(), texture.levels()[l].texels.end(),
+                                   set->texelsOf(set->images()[i].levels[l])));
+    }
+    // Each vertex of the finest triangles is where its place in the world says, to a quarter of 1/32 texel and the
+    // lattice's rounding; and all triangles of a wall have its material.
+    std::map<uint32_t, uint64_t> triangles;
+    double farthest = 0;
+    for (uint64_t page = 0; page < h.pages; ++page) {
+        const PageEntry& entry = dataset.pages[page];
+        const PageView& view = *cache->view(page);
+        const double cell = dataset.cellOf(entry.level);
+        const auto placeOf = [&](uint32_t v) {
+            const glm::dvec3 p = f64::decodeVertex(view.vertices[v].x, view.vertices[v].y);
+            return dataset.originOf(entry) + p * cell;
+        };
+        const auto visit = [&](uint32_t word) {
+            if (nodeType(word) != kNodeHard) return;
+            forEachTriangle(view.strips, word, [&](const Index3& t) {
+                glm::dvec3 p[3];
+                for (size_t i = 0; i < 3; ++i) p[i] = placeOf(t[i]);
+                const glm::dvec3 middle = (p[0] + p[1] + p[2]) / 3.0;
+                const uint32_t wanted = std::abs(middle.z) < 1e-3 ? 1u : std::abs(middle.y) < 1e-3 ? 2u : 0u;
+                for (size_t i = 0; i < 3; ++i) {
+                    const TexturePoint point = view.points.empty() ? TexturePoint{} : view.points[t[i]];
+                    ASSERT_EQ(point.material, wanted);
+                    ++triangles[wanted];
+                    if (wanted == 0) continue;
+                    const glm::dvec2 place =
+                        wanted == 1 ? TexturedWalls::floorPlace(p[i]) : TexturedWalls::wallPlace(p[i]);
+                    const glm::dvec2 found = glm::dvec2(point.u, point.v) * kTextureUnit;
+                    const glm::dvec2 size = wanted == 1 ? glm::dvec2(96, 40) : glm::dvec2(64, 64);
+                    const glm::dvec2 apart = glm::abs(found - glm::dvec2(place.x, 1 - place.y)) * size;
+                    farthest = std::max({farthest, apart.x, apart.y});
+                }
+            });
+        };
+        visit(view.header.root);
+        for (const uint32_t word : view.nodes) visit(word);
+    }
+    EXPECT_GT(triangles[1], 1000u);
+    EXPECT_GT(triangles[2], 1000u);
+    EXPECT_GT(triangles[0], 1000u);
+    EXPECT_LT(farthest, 0.02) << "texels";
+}
+
+TEST_F(ImageBuild, IsTheSameHoweverItIsBuilt) {
+    const std::string whole = built(options());
+    BuildOptions o = options();
+    o.threads = 1;
+    EXPECT_EQ(built(o), whole) << "one thread";
+    // So little memory that there are several bins.
+    o = options();
+    o.cell = 0.01;
+    const std::string fine = built(o);
+    o.memoryBytes = uint64_t{150} << 20;
+    EXPECT_EQ(built(o), fine) << "little memory";
+    writeWalls(true);
+    EXPECT_EQ(built(options()).size(), whole.size()) << "another order: materials may have other numbers";
+}
+
+TEST_F(ImageBuild, IsResumedAndBuiltInParts) {
+    const std::string whole = built(options());
+    for (const std::string stage : {"level", "writing"}) {
+        SCOPED_TRACE(stage);
+        fs::remove(output());
+        BuildOptions o = options();
+        o.checkpointSeconds = 0;
+        o.resume = true;
+        bool stop = true;
+        o.progress = [&](const BuildProgress& at) { return !(stop && at.stage.starts_with(stage)); };
+        const auto stopped = buildOctree(o);
+        ASSERT_FALSE(stopped.ok());
+        EXPECT_NE(stopped.error().line().find("resumed"), std::string::npos) << stopped.error().line();
+        stop = false;
+        EXPECT_EQ(built(o), whole);
+    }
+    fs::remove(output());
+    BuildOptions o = options();
+    o.overwrite = false;
+    const auto plan = planParts(o, 3);
+    ASSERT_TRUE(plan.ok()) << plan.error().line();
+    for (const PartStage& stage : stagesOf(3))
+        for (unsigned i = 0; i < stage.parts; ++i) {
+            const auto step = runPart({.folder = *plan, .stage = stage.name, .number = i, .threads = 2});
+            ASSERT_TRUE(step.ok()) << step.error().line();
+        }
+    EXPECT_EQ(contentOf(output()), whole);
+}
+
+TEST_F(ImageBuild, WithoutImagesFilesAreAsEver) {
+    // A ball has colours at its vertices, and no material.
+    writeBall(folder_ / "ball.ply", 20, 40);
+    BuildOptions o = options();
+    o.inputs = {folder_ / "ball.ply"};
+    const std::string with = built(o);
+    o.keepImages = false;
+    EXPECT_EQ(with, built(o));
+    // Materials whose images cannot be read, one line each, leave what is there without them.
+    std::ofstream(folder_ / "floor.png") << "no picture";
+    fs::remove(folder_ / "wall.png");
+    o.inputs = options().inputs;
+    const std::string plain = built(o);
+    o.keepImages = true;
+    const auto report = buildOctree(o);
+    ASSERT_TRUE(report.ok()) << report.error().line();
+    EXPECT_EQ(contentOf(output()), plain);
+    EXPECT_EQ(report->warnings.size(), 2u);
+}
+
+TEST_F(ImageBuild, AnImageThatCannotBeReadIsLeftOut) {
+    std::ofstream(folder_ / "floor.png") << "no picture";
+    const auto report = buildOctree(options());
+    ASSERT_TRUE(report.ok()) << report.error().line();
+    EXPECT_EQ(report->warnings.size(), 1u);
+    const auto dataset = readDataset(**openFile(output()));
+    EXPECT_EQ(dataset->header.images.images, 1u);
+    EXPECT_EQ(dataset->header.images.materials, 1u);
+}
+
+TEST_F(ImageBuild, AToleranceHasNoPlaceForImages) {
+    BuildOptions o = options();
+    o.error = 0.01;
+    const auto report = buildOctree(o);
+    ASSERT_FALSE(report.ok());
+    EXPECT_EQ(report.error().code, ErrorCode::Usage);
+}
+
+}  // namespace
+}  // namespace vcp
