@@ -123,9 +123,9 @@ TEST_F(ImageBuild, IsTheSameHoweverItIsBuilt) {
     EXPECT_EQ(built(o), whole) << "one thread";
     // So little memory that there are several bins.
     o = options();
-    o.cell = 0.01;
+    o.cell = 0.02;
     const std::string fine = built(o);
-    o.memoryBytes = uint64_t{150} << 20;
+    o.memoryBytes = uint64_t{140} << 20;
     EXPECT_EQ(built(o), fine) << "little memory";
     writeWalls(true);
     EXPECT_EQ(built(options()).size(), whole.size()) << "another order: materials may have other numbers";

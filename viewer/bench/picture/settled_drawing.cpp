@@ -52,7 +52,10 @@ Result<void> SettledDrawing::startAnew() {
     reader_ = std::make_shared<CountingReader>(file);
     VCP_TRY_ASSIGN(auto dataset, readDataset(*reader_));
     const auto shared = std::make_shared<const Dataset>(std::move(dataset));
-    return renderer_->open({{.dataset = shared, .source = std::make_shared<FilePageSource>(reader_, shared)}}, {});
+    PlacedDataset placed;
+    placed.dataset = shared;
+    placed.source = std::make_shared<FilePageSource>(reader_, shared);
+    return renderer_->open({placed}, {});
 }
 
 Result<PictureCost> SettledDrawing::draw(FrameRequest request) {
