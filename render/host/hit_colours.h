@@ -7,8 +7,8 @@
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
 
+#include "octree/imaged_triangle.h"
 #include "render/host/host_scene.h"
-#include "render/host/image_filter.h"
 #include "render/host/tile_hits.h"
 
 namespace vcp {
@@ -24,14 +24,11 @@ public:
     glm::vec4 at(int pixel, glm::vec3 direction, float pixelEdge);
 
 private:
-    /// A triangle in an image.
+    /// A triangle in an image, and how coordinates change over it.
     struct Textured {
-        const ImageSet::Image* image;
-        ImageWraps wraps;
-        glm::vec4 factor;
-        glm::vec2 place, toB, toC;  // coordinates of the first corner; from there to the others
-        f32::TextureSlope slope;    // by cells of the page's level
-        glm::vec3 normal;           // unit
+        ImagedTriangle triangle;
+        f32::TextureSlope slope;  // by cells of the page's level
+        glm::vec3 normal;         // unit
     };
     const std::optional<Textured>& texturedOf(uint32_t leaf);
     [[nodiscard]] std::optional<Textured> find(const HitLeaf& leaf) const;

@@ -15,6 +15,26 @@ void require(bool holds, const char* what) {
     std::abort();
 }
 
+/// Reads the same bytes as a colour page with places in images: refused, or it comes back.
+void checkTextured(std::span<const std::byte> packed, std::span<const std::byte> bytes, const vcp::PageView& page) {
+    std::vector<std::byte> textured(packed.begin(), packed.end());
+    textured[0] = std::byte{3};
+    const uint64_t size = vcp::texturedPageBytes(page.header);
+    const auto colour = vcp::unpackColour(textured, size, page);
+    if (!colour.ok() || page.header.vertices < 3) return;
+    const auto colours = std::as_bytes(std::span(*colour));
+    const vcp::PackedPage stored = vcp::packPage(bytes, colours);
+    const auto again = vcp::unpackGeometry(stored.geometry, stored.geometryBytes);
+    require(again.ok(), "a textured page can be stored");
+    const auto view = vcp::parsePage(std::as_bytes(std::span(*again)));
+    require(view.ok(), "a stored textured page comes back");
+    const auto coloursAgain = vcp::unpackColour(stored.colour, size, *view);
+    require(coloursAgain.ok(), "with its colours");
+    const vcp::PackedPage twice =
+        vcp::packPage(std::as_bytes(std::span(*again)), std::as_bytes(std::span(*coloursAgain)));
+    require(twice.colour == stored.colour, "and places");
+}
+
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
@@ -41,5 +61,6 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     const vcp::PackedPage packedTwice = vcp::packPage(std::as_bytes(std::span(*again)), {});
     require(packedTwice.geometry == packedAgain.geometry, "and with all that is in them");
     static_cast<void>(vcp::unpackColour(packed, vcp::colourPageBytes(page->header), *page));
+    checkTextured(packed, bytes, *page);
     return 0;
 }

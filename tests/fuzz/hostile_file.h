@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "octree/dataset_reader.h"
+#include "octree/image/image_tables.h"
 #include "octree/io/content_hash.h"
 
 namespace vcp::fuzz {
@@ -50,6 +51,30 @@ inline void hashPage(const std::vector<std::byte>& file, uint64_t offset, uint32
         hash = hashBytes(std::span(file).subspan(offset, stored));
 }
 
+/// Gives the tables of images the hashes of the tiles that they name, and the header that of the tables, as far as they
+/// lie in the file.
+inline void hashImages(std::vector<std::byte>& file, ImagesPlace& place) {
+    uint64_t at = place.offset + uint64_t{place.images} * sizeof(ImageRow);
+    if (place.offset > file.size() || at > file.size()) return;
+    uint64_t tiles = 0;
+    for (uint64_t i = 0; i < place.images; ++i) {
+        ImageRow row;
+        std::memcpy(&row, &file[place.offset + i * sizeof row], sizeof row);
+        if (std::min(row.width, row.height) < 1 || std::max(row.width, row.height) > kMaxImageEdge) return;
+        tiles += tilesOf(imageLevels(row.width, row.height, 0));
+    }
+    at += uint64_t{place.materials} * sizeof(MaterialRow);
+    const uint64_t end = at + tiles * sizeof(TileRow);
+    if (end > file.size()) return;
+    for (; at < end; at += sizeof(TileRow)) {
+        TileRow row;
+        std::memcpy(&row, &file[at], sizeof row);
+        hashPage(file, row.offset, row.storedBytes, row.hash);
+        std::memcpy(&file[at], &row, sizeof row);
+    }
+    place.hash = hashBytes(std::span(file).subspan(place.offset, end - place.offset));
+}
+
 /// The file that the input stands for.
 inline std::vector<std::byte> fileOf(std::span<const std::byte> input) {
     auto header = take<FileHeader>(input);
@@ -67,6 +92,7 @@ inline std::vector<std::byte> fileOf(std::span<const std::byte> input) {
         std::memcpy(&file[blockOffset(i / kEntriesPerBlock) + i % kEntriesPerBlock * sizeof(PageEntry)], &entries[i],
                     sizeof(PageEntry));
     }
+    if ((header.flags & kFlagImages) != 0) hashImages(file, header.images);
     for (uint64_t at = kDirectoryOffset; at < pages; at += kBlockBytes) {
         const uint64_t hash = hashBytes(std::span(file).subspan(at, kBlockBytes - 8));
         std::memcpy(&file[at + kBlockBytes - 8], &hash, sizeof hash);

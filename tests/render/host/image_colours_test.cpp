@@ -7,7 +7,7 @@
 
 #include "builder/build.h"
 #include "builder/stream/colour_encoding.h"
-#include "render/host/image_filter.h"
+#include "octree/image/image_filter.h"
 #include "render/host_renderer.h"
 #include "streaming/page_source.h"
 #include "tests/support/image_file.h"

@@ -1,4 +1,4 @@
-#include "render/host/image_filter.h"
+#include "octree/image/image_filter.h"
 
 #include <algorithm>
 #include <array>
