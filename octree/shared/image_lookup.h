@@ -47,6 +47,8 @@ struct ImageFootprint {
 // Surfaces that are seen more from the side than this are filtered as if they were not.
 const float kLeastCosine = 0.05f;
 const int kMostFootprintPlaces = 8;
+// What a sample is averaged over, in edges of a pixel: the mean of a pixel's samples is over about a pixel then.
+const float kFootprintPixels = 0.5f;
 
 // `n`: the triangle's normal, `direction`: of the ray, both unit; `pixelEdge`: of a pixel at the hit, in the units of
 // the slope; `size`: of the image, texels.

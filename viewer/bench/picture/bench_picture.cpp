@@ -61,7 +61,7 @@ public:
 
 private:
     Result<void> read(LightPicture& light) {
-        Renderer& renderer = drawing_->renderer();
+        PictureRenderer& renderer = drawing_->renderer();
         VCP_TRY_ASSIGN(const auto picture, renderer.readPicture());
         VCP_TRY_ASSIGN(auto depth, renderer.readDepth());
         VCP_TRY_ASSIGN(auto normals, renderer.readNormals());
