@@ -34,7 +34,9 @@ std::vector<glm::uvec2> tileOrder(const ImageLevel& level) {
     order.reserve(level.tiles());
     for (uint32_t y = 0; y < level.tilesY(); ++y)
         for (uint32_t x = 0; x < level.tilesX(); ++x) order.emplace_back(x, y);
-    std::ranges::sort(order, {}, [](glm::uvec2 tile) { return mortonEncode({tile.x, tile.y, 0}); });
+    std::sort(order.begin(), order.end(), [](glm::uvec2 a, glm::uvec2 b) {
+        return mortonEncode({a.x, a.y, 0}) < mortonEncode({b.x, b.y, 0});
+    });
     return order;
 }
 

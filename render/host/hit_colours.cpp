@@ -37,7 +37,8 @@ glm::vec4 HitColours::at(int pixel, glm::vec3 direction, float pixelEdge) {
     const std::optional<Textured>& t = texturedOf(leaf);
     if (!t) return colourAt(scene_, hits_, pixel);
     const ImageSet::Image& image = *t->triangle.image;
-    const float edge = std::ldexp(f32::kFootprintPixels * pixelEdge, -int(scene_.page(hits_.leaves[leaf].page).cellBits));
+    const float edge =
+        std::ldexp(f32::kFootprintPixels * pixelEdge, -int(scene_.page(hits_.leaves[leaf].page).cellBits));
     const f32::ImageFootprint footprint =
         f32::imageFootprint(t->slope, t->normal, direction, edge, glm::vec2(float(image.width), float(image.height)));
     return t->triangle.factor * filteredColour(*scene_.images(), image, t->triangle.wraps,
