@@ -5,8 +5,6 @@
 
 #include <glm/geometric.hpp>
 
-#include "render/host/hit_surface.h"
-
 namespace vcp {
 
 std::optional<HitColours::Textured> HitColours::find(const HitLeaf& leaf) const {
@@ -22,27 +20,26 @@ std::optional<HitColours::Textured> HitColours::find(const HitLeaf& leaf) const 
     const glm::vec3 n = glm::cross(p[1] - p[0], p[2] - p[0]);
     return Textured{.triangle = *triangle,
                     .slope = f32::textureSlope(p[0], p[1], p[2], triangle->toB, triangle->toC),
-                    .normal = n * glm::inversesqrt(std::max(glm::dot(n, n), 1e-30f))};
+                    .normal = n * glm::inversesqrt(std::max(glm::dot(n, n), 1e-30f)),
+                    .depth = -1,
+                    .places = {}};
 }
 
-const std::optional<HitColours::Textured>& HitColours::texturedOf(uint32_t leaf) {
+HitColours::Textured* HitColours::texturedAt(int pixel) {
+    if (scene_.images() == nullptr || hits_.blended[size_t(pixel)]) return nullptr;
     if (leaves_.size() < hits_.leaves.size()) leaves_.resize(hits_.leaves.size());
+    const uint32_t leaf = hits_.leaf[pixel];
     if (!leaves_[leaf]) leaves_[leaf] = find(hits_.leaves[leaf]);
-    return *leaves_[leaf];
+    return *leaves_[leaf] ? &**leaves_[leaf] : nullptr;
 }
 
-glm::vec4 HitColours::at(int pixel, glm::vec3 direction, float pixelEdge) {
-    const uint32_t leaf = hits_.leaf[pixel];
-    if (scene_.images() == nullptr || hits_.blended[size_t(pixel)]) return colourAt(scene_, hits_, pixel);
-    const std::optional<Textured>& t = texturedOf(leaf);
-    if (!t) return colourAt(scene_, hits_, pixel);
-    const ImageSet::Image& image = *t->triangle.image;
-    const float edge =
-        std::ldexp(f32::kFootprintPixels * pixelEdge, -int(scene_.page(hits_.leaves[leaf].page).cellBits));
-    const f32::ImageFootprint footprint =
-        f32::imageFootprint(t->slope, t->normal, direction, edge, glm::vec2(float(image.width), float(image.height)));
-    return t->triangle.factor * filteredColour(*scene_.images(), image, t->triangle.wraps,
-                                               t->triangle.at(hits_.x[pixel], hits_.y[pixel]), footprint);
+void HitColours::setPlaces(Textured& t, int pixel, const PixelView& view) const {
+    const ImageSet::Image& image = *t.triangle.image;
+    const uint32_t cellBits = scene_.page(hits_.leaves[hits_.leaf[pixel]].page).cellBits;
+    const float edge = std::ldexp(f32::kFootprintPixels * view.edge, -int(cellBits));
+    const glm::vec2 size(float(image.width), float(image.height));
+    t.depth = hits_.depth[pixel];
+    t.places = placesOf(image, f32::imageFootprint(t.slope, t.normal, view.direction, edge, size));
 }
 
 }  // namespace vcp

@@ -87,7 +87,8 @@ TEST(ImageFilter, CoarserLevelsDoWhereMemoryIsScarce) {
     ASSERT_EQ(set.images()[0].finest, 1u);
     for (int i = 0; i < 50; ++i) {
         const glm::dvec2 at(0.02 * i, 0.7 - 0.01 * i);
-        const glm::vec4 found = filteredColour(set, set.images()[0], {}, glm::vec2(at), {{0, 0}, 0.5f, 0.5f});
+        const glm::vec4 found =
+            filteredColour(set, set.images()[0], {}, glm::vec2(at), placesOf(set.images()[0], {{0, 0}, 0.5f, 0.5f}));
         const glm::dvec4 wanted = oracle(image, {}, at, {{0, 0}, 2, 2});
         for (int c = 0; c < 4; ++c) EXPECT_NEAR(found[c], wanted[c], 2e-3) << i;
     }
@@ -113,7 +114,8 @@ TEST(ImageFilter, IsItsDefinition) {
         single.width = float(footprint.width);
         single.length = float(footprint.length);
         single.along = glm::vec2(footprint.along);
-        const glm::vec4 found = filteredColour(set, set.images()[0], wraps, glm::vec2(at), single);
+        const glm::vec4 found =
+            filteredColour(set, set.images()[0], wraps, glm::vec2(at), placesOf(set.images()[0], single));
         const glm::dvec4 wanted = oracle(image, wraps, at, footprint);
         for (int c = 0; c < 4; ++c) EXPECT_NEAR(found[c], wanted[c], 2e-3) << c;
     }
