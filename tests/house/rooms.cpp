@@ -9,8 +9,9 @@ const std::vector<Room>& rooms() {
         {"octree/shared", {}},
         {"octree/io", {}},
         {"octree/surface", {"octree/shared"}},
+        {"octree/image", {"octree/shared", "octree/io", "octree/surface"}},
         {"octree/page", {"octree/shared", "octree/io", "octree/surface"}},
-        {"octree", {"octree/shared", "octree/io", "octree/surface", "octree/page"}},
+        {"octree", {"octree/shared", "octree/io", "octree/surface", "octree/image", "octree/page"}},
 
         {"builder/stream", {"octree/"}},
         {"builder/texture", {"octree/", "builder/stream"}},
