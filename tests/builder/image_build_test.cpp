@@ -120,13 +120,13 @@ TEST_F(ImageBuild, IsTheSameHoweverItIsBuilt) {
     const std::string whole = built(options());
     BuildOptions o = options();
     o.threads = 1;
-    EXPECT_EQ(built(o), whole) << "one thread";
+    EXPECT_TRUE(built(o) == whole) << "one thread";
     // So little memory that there are several bins.
     o = options();
     o.cell = 0.02;
     const std::string fine = built(o);
-    o.memoryBytes = uint64_t{140} << 20;
-    EXPECT_EQ(built(o), fine) << "little memory";
+    o.memoryBytes = uint64_t{152} << 20;
+    EXPECT_TRUE(built(o) == fine) << "little memory";
     writeWalls(true);
     EXPECT_EQ(built(options()).size(), whole.size()) << "another order: materials may have other numbers";
 }
@@ -145,7 +145,7 @@ TEST_F(ImageBuild, IsResumedAndBuiltInParts) {
         ASSERT_FALSE(stopped.ok());
         EXPECT_NE(stopped.error().line().find("resumed"), std::string::npos) << stopped.error().line();
         stop = false;
-        EXPECT_EQ(built(o), whole);
+        EXPECT_TRUE(built(o) == whole);
     }
     fs::remove(output());
     BuildOptions o = options();
@@ -157,7 +157,7 @@ TEST_F(ImageBuild, IsResumedAndBuiltInParts) {
             const auto step = runPart({.folder = *plan, .stage = stage.name, .number = i, .threads = 2});
             ASSERT_TRUE(step.ok()) << step.error().line();
         }
-    EXPECT_EQ(contentOf(output()), whole);
+    EXPECT_TRUE(contentOf(output()) == whole);
 }
 
 TEST_F(ImageBuild, WithoutImagesFilesAreAsEver) {
@@ -167,7 +167,7 @@ TEST_F(ImageBuild, WithoutImagesFilesAreAsEver) {
     o.inputs = {folder_ / "ball.ply"};
     const std::string with = built(o);
     o.keepImages = false;
-    EXPECT_EQ(with, built(o));
+    EXPECT_TRUE(with == built(o));
     // Materials whose images cannot be read, one line each, leave what is there without them.
     std::ofstream(folder_ / "floor.png") << "no picture";
     fs::remove(folder_ / "wall.png");
@@ -176,7 +176,7 @@ TEST_F(ImageBuild, WithoutImagesFilesAreAsEver) {
     o.keepImages = true;
     const auto report = buildOctree(o);
     ASSERT_TRUE(report.ok()) << report.error().line();
-    EXPECT_EQ(contentOf(output()), plain);
+    EXPECT_TRUE(contentOf(output()) == plain);
     EXPECT_EQ(report->warnings.size(), 2u);
 }
 
