@@ -45,7 +45,8 @@ PageSections pageSections(const PageHeader& header);
 
 /// Where a vertex of a hard leaf's triangles is in an image. All three vertices of a triangle have the same material.
 struct TexturePoint {
-    int32_t u = 0, v = 0;   ///< in kTextureUnit of the image's width and height; (0, 0): its upper left corner, v downwards
+    int32_t u = 0,
+            v = 0;  ///< in kTextureUnit of the image's width and height; (0, 0): its upper left corner, v downwards
     uint32_t material = 0;  ///< number of the material (octree/image/image_tables.h) plus 1; 0: none, u and v are 0
 
     bool operator==(const TexturePoint&) const = default;
@@ -80,7 +81,8 @@ struct PageView {
 /// Checks every word of a page, so that a traversal cannot leave it or loop: counts against the size, nodes
 /// form a tree of bounded depth, leaves and indices are in range. `bytes` must be 16-byte aligned; may be
 /// hostile. `colours` is empty or a colour page, with points
-/// or without; whether the file has their materials is not known here. Errors: InvalidInput, with the byte within the page.
+/// or without; whether the file has their materials is not known here. Errors: InvalidInput, with the byte within the
+/// page.
 Result<PageView> parsePage(std::span<const std::byte> bytes, std::span<const std::byte> colours = {});
 
 /// Returns the view of a page that parsePage has accepted before, wherever its bytes lie now; checks nothing. `colours`

@@ -8,8 +8,8 @@
 
 #include <gtest/gtest.h>
 
-#include "octree/image/image_set.h"
 #include "octree/dataset_reader.h"
+#include "octree/image/image_set.h"
 #include "octree/vcp_verify.h"
 #include "tests/support/image_file.h"
 #include "tests/support/test_folder.h"
