@@ -45,11 +45,18 @@ private:
         storedOfRoot_{};  // by the root of light, of which stored values are nearly a multiple
 };
 
-/// Adds a texel's light, weighted by its alpha.
-void add(const ColourTables& tables, glm::vec4& sum, uint32_t texel, float weight) {
-    const float alpha = weight * (texel >> 24 == 255 ? 1.0f : float(texel >> 24) / 255);
-    sum += alpha * glm::vec4(tables.lightOf(texel & 255u), tables.lightOf(texel >> 8 & 255u),
-                             tables.lightOf(texel >> 16 & 255u), 1);
+/// Adds the light of four texels, weighted by their alpha.
+void add(const ColourTables& tables, glm::vec4& sum, const uint32_t (&texels)[4], const float (&weights)[4]) {
+    float share[4] = {weights[0], weights[1], weights[2], weights[3]};
+    // Most texels hide all that is behind them.
+    if ((texels[0] & texels[1] & texels[2] & texels[3]) >> 24 != 255)
+        for (int i = 0; i < 4; ++i) share[i] *= float(texels[i] >> 24) / 255;
+    for (int channel = 0; channel < 3; ++channel)
+        sum[channel] += (share[0] * tables.lightOf(texels[0] >> 8 * channel & 255u) +
+                         share[1] * tables.lightOf(texels[1] >> 8 * channel & 255u)) +
+                        (share[2] * tables.lightOf(texels[2] >> 8 * channel & 255u) +
+                         share[3] * tables.lightOf(texels[3] >> 8 * channel & 255u));
+    sum.w += (share[0] + share[1]) + (share[2] + share[3]);
 }
 
 /// Returns the texels that are shown at a place of a row and after it.
@@ -58,23 +65,26 @@ glm::ivec2 pairOf(int at, int size, uint32_t wrap) {
     return {f32::wrappedTexel(at, size, wrap), f32::wrappedTexel(at + 1, size, wrap)};
 }
 
+/// Returns the largest whole number that is not above `x`; |x| < 2^31. (std::floor is a call on old processors.)
+int wholeBelow(float x) {
+    const int whole = int(x);
+    return whole - (float(whole) > x ? 1 : 0);
+}
+
 /// Adds what a level shows at a point, between four texels.
 void addBilinear(glm::vec4& sum, const ImageSet& set, const ImageSet::Level& level, ImageWraps wraps, glm::vec2 at,
                  float weight) {
     const int width = int(level.width), height = int(level.height);
     const float x = at.x * float(width) - 0.5f, y = at.y * float(height) - 0.5f;
-    const float left = std::floor(x), top = std::floor(y);
-    const float fx = x - left, fy = y - top;
-    const int column = int(left), row = int(top);
+    const int column = wholeBelow(x), row = wholeBelow(y);
+    const float fx = x - float(column), fy = y - float(row);
     const glm::ivec2 columns = pairOf(column, width, wraps.u), rows = pairOf(row, height, wraps.v);
     const uint32_t* const texels = set.texelsOf(level);
     const ColourTables& tables = ColourTables::get();
-    for (int j = 0; j < 2; ++j) {
-        const uint32_t* const line = texels + size_t(rows[j]) * size_t(width);
-        const float share = weight * (j == 0 ? 1 - fy : fy);
-        add(tables, sum, line[columns[0]], share * (1 - fx));
-        add(tables, sum, line[columns[1]], share * fx);
-    }
+    const uint32_t* const upper = texels + size_t(rows[0]) * size_t(width);
+    const uint32_t* const lower = texels + size_t(rows[1]) * size_t(width);
+    add(tables, sum, {upper[columns[0]], upper[columns[1]], lower[columns[0]], lower[columns[1]]},
+        {weight * (1 - fy) * (1 - fx), weight * (1 - fy) * fx, weight * fy * (1 - fx), weight * fy * fx});
 }
 
 }  // namespace
@@ -100,7 +110,8 @@ glm::vec4 filteredColour(const ImageSet& set, const ImageSet::Image& image, Imag
     }
     if (!(sum.w > 0)) return glm::vec4(0);
     const ColourTables& tables = ColourTables::get();
-    return {tables.storedOf(sum.x / sum.w), tables.storedOf(sum.y / sum.w), tables.storedOf(sum.z / sum.w), sum.w};
+    const float scale = 1 / sum.w;
+    return {tables.storedOf(sum.x * scale), tables.storedOf(sum.y * scale), tables.storedOf(sum.z * scale), sum.w};
 }
 
 }  // namespace vcp

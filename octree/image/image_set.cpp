@@ -29,16 +29,23 @@ Result<ImageSet> ImageSet::read(const ByteReader& reader, const ImagesPlace& pla
     ImageSet set;
     set.materials_ = tables.materials;
     const std::vector<uint32_t> finest = finestWithin(tables.images, mostBytes);
+    uint64_t kept = 0;
+    for (size_t i = 0; i < tables.images.size(); ++i) {
+        const auto levels = imageLevels(tables.images[i].width, tables.images[i].height, 0);
+        for (const ImageLevel& level : std::span(levels).subspan(finest[i])) kept += level.texels();
+    }
+    set.texels_.reserve(kept);
     std::vector<uint32_t> texels(size_t{kImageTileEdge} * kImageTileEdge);
     for (size_t i = 0; i < tables.images.size(); ++i) {
         const ImageRow& row = tables.images[i];
         Image& image = set.images_.emplace_back(Image{row.width, row.height, finest[i], {}});
         const auto levels = imageLevels(row.width, row.height, row.firstTile);
         // The coarse levels come first, so that those which are kept lie together.
-        const auto kept = std::span(levels).subspan(finest[i]);
-        VCP_TRY_ASSIGN(const auto stored, readTiles(reader, tables, row.firstTile,
-                                                    kept.front().firstTile + kept.front().tiles() - row.firstTile));
-        for (const ImageLevel& level : kept) {
+        const auto inMemory = std::span(levels).subspan(finest[i]);
+        VCP_TRY_ASSIGN(const auto stored,
+                       readTiles(reader, tables, row.firstTile,
+                                 inMemory.front().firstTile + inMemory.front().tiles() - row.firstTile));
+        for (const ImageLevel& level : inMemory) {
             const uint64_t first = set.texels_.size();
             image.levels.push_back({level.width, level.height, first});
             set.texels_.resize(first + level.texels());

@@ -25,36 +25,34 @@ uint32_t plusGreen(uint32_t coded) {
     return (coded & 0xff00ff00u) | ((coded + green) & 255u) | (((coded >> 16) + green) & 255u) << 16;
 }
 
-/// Foretells a value from those left, above, and left above: the left or upper one at an edge, else on their plane.
-uint8_t foretold(uint8_t left, uint8_t above, uint8_t corner) {
-    const uint8_t least = std::min(left, above), most = std::max(left, above);
-    if (corner >= most) return least;
-    if (corner <= least) return most;
-    return uint8_t(left + above - corner);
+/// Foretells a value from those left, above, and left above: the middle one of the first two and of what lies on the
+/// plane through all three, so that the left or the upper one counts at an edge. Without a branch.
+int foretold(int left, int above, int corner) {
+    return std::max(std::min(left, above), std::min(std::max(left, above), left + above - corner));
 }
 
-/// Foretells a channel of texel (x, y) of a tile, of which the texels before it are known.
-uint8_t foretold(std::span<const uint32_t> texels, uint32_t width, uint32_t x, uint32_t y, size_t channel) {
-    const size_t at = size_t{y} * width + x;
-    if (y == 0) return x == 0 ? uint8_t{0} : channelOf(texels[at - 1], channel);
-    if (x == 0) return channelOf(texels[at - width], channel);
-    return foretold(channelOf(texels[at - 1], channel), channelOf(texels[at - width], channel),
-                    channelOf(texels[at - width - 1], channel));
+/// Calls visit(at, foretold) for each value of a plane, row by row; what comes before it is known by then.
+template <class Visit>
+void forEachForetold(const uint8_t* plane, glm::uvec2 size, Visit&& visit) {
+    for (uint32_t x = 0; x < size.x; ++x) visit(x, x == 0 ? 0 : int{plane[x - 1]});
+    for (uint32_t y = 1; y < size.y; ++y) {
+        const size_t row = size_t{y} * size.x;
+        const uint8_t* const above = plane + (row - size.x);
+        visit(row, int{above[0]});
+        for (uint32_t x = 1; x < size.x; ++x) visit(row + x, foretold(plane[row + x - 1], above[x], above[x - 1]));
+    }
 }
 
 }  // namespace
 
 std::vector<std::byte> packTile(std::span<const uint32_t> texels, glm::uvec2 size) {
     const size_t count = size_t{size.x} * size.y;
-    std::vector<uint32_t> coded(count);
-    std::transform(texels.begin(), texels.begin() + std::ptrdiff_t(count), coded.begin(), lessGreen);
-    std::vector<uint8_t> planes;
-    planes.reserve(kChannels * count);
-    for (size_t channel = 0; channel < kChannels; ++channel)
-        for (uint32_t y = 0; y < size.y; ++y)
-            for (uint32_t x = 0; x < size.x; ++x)
-                planes.push_back(uint8_t(channelOf(coded[size_t{y} * size.x + x], channel) -
-                                         foretold(coded, size.x, x, y, channel)));
+    std::vector<uint8_t> plane(count), planes(kChannels * count);
+    for (size_t channel = 0; channel < kChannels; ++channel) {
+        for (size_t i = 0; i < count; ++i) plane[i] = channelOf(lessGreen(texels[i]), channel);
+        uint8_t* const rest = planes.data() + channel * count;
+        forEachForetold(plane.data(), size, [&](size_t at, int value) { rest[at] = uint8_t(plane[at] - value); });
+    }
     std::vector<std::byte> packed(ZSTD_compressBound(planes.size()));
     const size_t bytes = ZSTD_compress(packed.data(), packed.size(), planes.data(), planes.size(), kTileLevel);
     packed.resize(ZSTD_isError(bytes) ? 0 : bytes);  // cannot fail with room for compressBound
@@ -67,15 +65,14 @@ Result<void> unpackTile(std::span<const std::byte> packed, glm::uvec2 size, std:
     if (ZSTD_getFrameContentSize(packed.data(), packed.size()) != planes.size() ||
         ZSTD_decompress(planes.data(), planes.size(), packed.data(), packed.size()) != planes.size())
         return Error{.code = ErrorCode::InvalidInput, .message = "does not decode to its texels"};
-    std::fill_n(texels.begin(), count, 0u);
     for (size_t channel = 0; channel < kChannels; ++channel) {
-        const uint8_t* more = planes.data() + channel * count;
-        for (uint32_t y = 0; y < size.y; ++y)
-            for (uint32_t x = 0; x < size.x; ++x)
-                texels[size_t{y} * size.x + x] |= uint32_t{uint8_t(foretold(texels, size.x, x, y, channel) + *more++)}
-                                                  << 8 * channel;
+        uint8_t* const plane = planes.data() + channel * count;
+        forEachForetold(plane, size, [&](size_t at, int value) { plane[at] = uint8_t(plane[at] + value); });
     }
-    std::transform(texels.begin(), texels.begin() + std::ptrdiff_t(count), texels.begin(), plusGreen);
+    const uint8_t* const plane = planes.data();
+    for (size_t i = 0; i < count; ++i)
+        texels[i] = plusGreen(plane[i] | uint32_t{plane[count + i]} << 8 | uint32_t{plane[2 * count + i]} << 16 |
+                              uint32_t{plane[3 * count + i]} << 24);
     return {};
 }
 
