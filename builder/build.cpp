@@ -568,6 +568,7 @@ private:
                 VCP_TRY_ASSIGN(auto known, files_.textures->load(bin));
                 addTextures(mesh, std::move(known));
             }
+            if (pass_ + 1 == plan_.levels()) settleNormals(mesh);
             if (!vertices)
                 VCP_TRY(buildBinPages(plan_, mesh,
                                       {.pass = pass_,

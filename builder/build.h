@@ -35,6 +35,11 @@ enum class ColourChoice { Auto, Vertex, Texture, None };
 /// always where there is an `error`.
 enum class CoarseLeaves { Slabs, Mesh };
 
+/// Which normals vertices of the finest level have. Mesh: the file's own, where it has them and they differ from the
+/// computed ones (settleNormals, lattice/lattice_mesh.h). Computed: means over the triangles around, whatever the file
+/// has.
+enum class VertexNormals { Mesh, Computed };
+
 struct BuildProgress {
     std::string stage = {};  ///< "reading", "sorting", "level 5 of 6", "writing", "done"
     double fraction = 0;     ///< fraction of the whole build, 0 to 1, never decreasing; 1: done
@@ -62,6 +67,7 @@ struct BuildOptions {
     /// Keeps the images of the materials, and where triangles of the finest level are in them; colours at vertices
     /// stay.
     bool keepImages = false;
+    VertexNormals vertexNormals = VertexNormals::Mesh;
     /// Is given what is read, for a picture meanwhile (mesh_sample.h); nothing where work is resumed. May be empty.
     std::shared_ptr<MeshSample> sample;
     /// Called from one thread at a time, about ten times a second and whenever a stage begins. Returning false cancels;

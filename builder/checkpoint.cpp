@@ -14,7 +14,7 @@ namespace {
 using nlohmann::json;
 
 // Version of the temporary files; a build does not continue from another version's.
-constexpr int kTempVersion = 14;
+constexpr int kTempVersion = 15;
 
 json jsonOf(glm::dvec3 v) { return {v.x, v.y, v.z}; }
 
@@ -193,9 +193,10 @@ Result<void> reopenSpools(std::deque<PageSpool>& spools, const SpoolLengths& len
 }  // namespace
 
 std::string buildFingerprint(const BuildOptions& options) {
-    std::string text = fmt::format("{} {} {:a} {:a} {} {} {} {} {}", kTempVersion, kFileVersion, options.cell,
-                                   options.error, options.errorIsRelative, int(options.colour),
-                                   int(options.coarseLeaves), options.keepImages, options.format);
+    std::string text =
+        fmt::format("{} {} {:a} {:a} {} {} {} {} {} {}", kTempVersion, kFileVersion, options.cell, options.error,
+                    options.errorIsRelative, int(options.colour), int(options.coarseLeaves), options.keepImages,
+                    int(options.vertexNormals), options.format);
     for (const auto& input : options.inputs) {
         std::error_code ignored;
         const auto size = std::filesystem::file_size(input, ignored);

@@ -111,6 +111,7 @@ private:
         if (exact) {
             std::copy_n(t.colour, 3, f.colour);
             std::copy_n(t.uv, 3, f.uv);
+            std::copy_n(t.normal, 3, f.normal);
             f.material = t.material;
             floats_.push_back(f);
         } else {
@@ -179,6 +180,10 @@ Result<SoupMeasures> readInputs(const BuildOptions& options, TempSpace& space, u
             if (!more) break;
             hasVertexColours |= !chunk.colours.empty();
             if (options.sample) options.sample->addVertices(chunk.positions);
+            if (options.vertexNormals == VertexNormals::Computed) {
+                chunk.normals.clear();
+                chunk.cornerNormals.clear();
+            }
             VCP_TRY(join.add(chunk, materialBase));
             const uint64_t bytes = doneBytes + stream->bytesRead();
             // A pipe does not say how many bytes will come.

@@ -7,6 +7,7 @@
 #include <glm/geometric.hpp>
 
 #include "builder/stream/colour_encoding.h"
+#include "octree/surface/leaf_math.h"
 
 namespace vcp {
 
@@ -17,6 +18,19 @@ uint32_t middleColour(uint32_t a, uint32_t b) { return (a & b) + (((a ^ b) & 0xf
 
 /// Returns the multiple of a power of two that is nearest to a point, which has no negative coordinates.
 glm::i32vec3 roundTo(glm::dvec3 p, int step) { return glm::i32vec3(p / double(step) + 0.5) * step; }
+
+bool isKnown(glm::dvec3 normal) { return normal != glm::dvec3(0); }
+
+/// Returns whether a triangle has normals of its own, and these, on the side of the facet.
+template <class Real>
+bool takeNormals(const WorldTriangle<Real>& triangle, glm::dvec3 (&normals)[3]) {
+    const auto& n = triangle.normal;
+    if (n[0] == kUnknownNormal && n[1] == kUnknownNormal && n[2] == kUnknownNormal) return false;
+    const glm::dvec3 a(triangle.corner[0]), b(triangle.corner[1]), c(triangle.corner[2]);
+    const glm::dvec3 facet = glm::cross(b - a, c - a);
+    for (int i = 0; i < 3; ++i) normals[i] = n[i] == kUnknownNormal ? glm::dvec3(0) : f64::cornerNormal(n[i], facet);
+    return true;
+}
 
 // A piece that was cut says that it may have strayed by so many roundings at least: those beside it that lost their
 // area are left out, and rays in single precision miss long needles by about as much.
@@ -45,8 +59,8 @@ bool LatticeSnapper::tooLong(glm::i32vec3 a, glm::i32vec3 b) const {
 }
 
 LatticeSnapper::Point LatticeSnapper::pointOf(const Piece& piece, int corner) {
-    return {piece.triangle.corner[corner], piece.moved[corner], piece.step[corner], piece.triangle.colour[corner],
-            piece.uv[corner]};
+    return {piece.triangle.corner[corner], piece.moved[corner], piece.step[corner],
+            piece.triangle.colour[corner], piece.uv[corner],    piece.normal[corner]};
 }
 
 LatticeSnapper::Point LatticeSnapper::middle(const Point& a, const Point& b) const {
@@ -54,8 +68,12 @@ LatticeSnapper::Point LatticeSnapper::middle(const Point& a, const Point& b) con
     glm::i32vec3 at(glm::floor(exact));
     const int step = pages_.stepAt(at);
     if (step > 1) at = roundTo(exact, step);
-    return {at, (a.moved + b.moved) / 2.0 + (glm::dvec3(at) - exact), step, middleColour(a.colour, b.colour),
-            (a.uv + b.uv) * 0.5f};
+    return {at,
+            (a.moved + b.moved) / 2.0 + (glm::dvec3(at) - exact),
+            step,
+            middleColour(a.colour, b.colour),
+            (a.uv + b.uv) * 0.5f,
+            isKnown(a.normal) && isKnown(b.normal) ? (a.normal + b.normal) / 2.0 : glm::dvec3(0)};
 }
 
 // Whether an edge is cut does not depend on the triangle.
@@ -85,6 +103,7 @@ int LatticeSnapper::cut(const Piece& piece, Piece (&pieces)[4]) const {
             p.moved[i] = point.moved;
             p.step[i] = point.step;
             p.uv[i] = point.uv;
+            p.normal[i] = point.normal;
         }
     };
     if (cuts == 1) {
@@ -158,6 +177,8 @@ LatticeSnapper::Piece LatticeSnapper::snap(const WorldTriangle<Real>& triangle) 
         piece.uv[i] = triangle.uv[i];
     }
     piece.material = triangle.material;
+    piece.hasNormals = takeNormals(triangle, piece.normal);
+    std::copy_n(triangle.normal, 3, t.own);
     return piece;
 }
 

@@ -51,6 +51,8 @@ private:
         glm::dvec3 moved[3];  ///< how far each corner lies from where the mesh has it, in steps of the lattice
         int step[3];          ///< each corner lies on multiples of so many
         int cuts;
+        bool hasNormals;
+        glm::dvec3 normal[3];  ///< the mesh's own, on the facet's side; 0: unknown. Not unit where edges were cut
         glm::vec2 uv[3];
         uint32_t material;
     };
@@ -62,6 +64,7 @@ private:
         int step;
         uint32_t colour;
         glm::vec2 uv;
+        glm::dvec3 normal;
     };
 
     template <class Real>
@@ -88,6 +91,8 @@ private:
         if (painted && !placed_.empty()) place = placeOf(piece);
         if (painted) paint(piece);
         piece.triangle.stray = strayOf(piece);
+        if (piece.hasNormals && piece.cuts > 0)
+            for (int i = 0; i < 3; ++i) piece.triangle.own[i] = packDirection(piece.normal[i]);
         if constexpr (std::is_invocable_v<Sink&, const LatticeTriangle&>)
             sink(std::as_const(piece.triangle));
         else

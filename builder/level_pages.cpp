@@ -52,7 +52,7 @@ Result<BuiltPage> buildPage(const LevelSettings& settings, const LatticeMesh& me
 uint64_t bytesOf(const LatticeMesh& mesh) {
     return mesh.positions.size() * (sizeof(glm::i32vec3) + 2 * sizeof(uint32_t)) +
            mesh.triangles.size() * (sizeof mesh.triangles[0] + sizeof(float)) +
-           mesh.textures.size() * sizeof mesh.textures[0];
+           mesh.textures.size() * sizeof mesh.textures[0] + mesh.cornerNormals.size() * sizeof mesh.cornerNormals[0];
 }
 
 /// Measures of triangles, each counted by itself; in cells.
@@ -75,14 +75,16 @@ Extents extentsOf(const LatticeMesh& mesh, std::span<const uint32_t> triangles, 
     return sum;
 }
 
-// Where a page's triangles have images, each takes so much more: its vertices may all be its own, with their places.
-constexpr uint64_t kTexturedWorkBytes = 150;
+// Where a page's triangles have images or normals of their own, each takes so much more: its vertices may all be its
+// own, with their places.
+constexpr uint64_t kOwnVerticesWorkBytes = 150;
 
 /// Returns the memory to build a page of these triangles: its bytes first, then the surface in it.
 uint64_t workOf(const LevelSettings& settings, const LatticeMesh& mesh, std::span<const uint32_t> triangles,
                 bool withSurface) {
     const uint64_t count = triangles.size();
-    const uint64_t exact = exactPageWorkBytes(count) + (mesh.textures.empty() ? 0 : kTexturedWorkBytes * count);
+    const bool hasOwn = !mesh.textures.empty() || !mesh.cornerNormals.empty();
+    const uint64_t exact = exactPageWorkBytes(count) + (hasOwn ? kOwnVerticesWorkBytes * count : 0);
     if (settings.exact && !withSurface) return exact;
     const double margin = settings.exact ? kExactMarginCells : kBinMarginCells;
     const Extents extents = extentsOf(mesh, triangles, settings.grid.edgeCells() + 2 * margin);

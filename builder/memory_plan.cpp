@@ -22,7 +22,7 @@ constexpr uint64_t kThreadBytes = 6 * kMiB;
 constexpr uint64_t kLeastUsable = 96 * kMiB;
 
 // A bin's records, its mesh, and what the step to the coarser level needs; measured, with some room to spare.
-constexpr uint64_t kBinTriangleBytes = 260;
+constexpr uint64_t kBinTriangleBytes = 284;
 // Where a triangle is in an image: its record, and in the mesh.
 constexpr uint64_t kTextureBytes = 64 + 36;
 

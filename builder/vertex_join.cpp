@@ -28,7 +28,8 @@ VertexJoin::VertexJoin(TempSpace& space, uint64_t vertexBytes, Emit emit)
 Result<void> VertexJoin::takeVertices(const MeshChunk& chunk) {
     std::vector<Vertex> rest;
     for (size_t i = 0; i < chunk.positions.size(); ++i) {
-        const Vertex vertex{chunk.positions[i], chunk.colours.empty() ? kWhite : chunk.colours[i]};
+        const Vertex vertex{chunk.positions[i], chunk.colours.empty() ? kWhite : chunk.colours[i],
+                            chunk.normals.empty() ? kUnknownNormal : chunk.normals[i]};
         if (resident_.size() < chunkVertices_) {
             // Doubling would exceed the memory by half.
             if (resident_.size() == resident_.capacity())
@@ -76,6 +77,7 @@ Result<void> VertexJoin::add(const MeshChunk& chunk, uint32_t materialBase) {
         if (std::max({w.vertex[0], w.vertex[1], w.vertex[2]}) >= kMaxVertices)
             return Error{.code = ErrorCode::InvalidInput,
                          .message = "a triangle names a vertex that the file does not have"};
+        if (!chunk.cornerNormals.empty()) std::copy_n(chunk.cornerNormals[k].begin(), 3, w.triangle.normal);
         if (!chunk.uvs.empty())
             for (int i = 0; i < 3; ++i) w.triangle.uv[i] = chunk.uvs[k][i];
         if (!chunk.materials.empty() && chunk.materials[k] != kNoMaterial)
@@ -93,6 +95,7 @@ Result<void> VertexJoin::resolve(Waiting& w) {
         if (w.vertex[i] >= residentFirst_ && at < resident_.size()) {
             w.triangle.corner[i] = resident_[at].position;
             w.triangle.colour[i] = resident_[at].colour;
+            if (w.triangle.normal[i] == kUnknownNormal) w.triangle.normal[i] = resident_[at].normal;
             w.vertex[i] = kDone;
         } else {
             lowest = std::min(lowest, w.vertex[i]);

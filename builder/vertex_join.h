@@ -24,7 +24,7 @@ class VertexJoin {
 public:
     using Emit = std::function<Result<void>(const WorldTriangle<double>&)>;
 
-    /// `vertexBytes`: memory for vertices, with their colours.
+    /// `vertexBytes`: memory for vertices, with their colours and normals.
     VertexJoin(TempSpace& space, uint64_t vertexBytes, Emit emit);
 
     /// Takes a chunk of the stream, in order. `materialBase`: number of materials of the inputs before this one.
@@ -39,7 +39,7 @@ private:
     struct Vertex {
         glm::dvec3 position;
         uint32_t colour;
-        uint32_t reserved = 0;
+        uint32_t normal;
     };
     struct Waiting {
         WorldTriangle<double> triangle;

@@ -1,6 +1,7 @@
 #include "builder/lattice/lattice_mesh.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <numeric>
 
@@ -9,6 +10,7 @@
 #include <oneapi/tbb/parallel_invoke.h>
 #include <oneapi/tbb/parallel_sort.h>
 #include <glm/geometric.hpp>
+#include <glm/trigonometric.hpp>
 
 #include "builder/lattice/page_partition.h"
 #include "octree/surface/leaf_math.h"
@@ -152,25 +154,46 @@ private:
 struct OrderedTriangle {
     uint32_t second, third;
     float stray;
-    uint32_t turned;
+    uint32_t source;  ///< twice the triangle's number in the soup, and 1 more where `turned`
 
     [[nodiscard]] uint64_t key() const { return uint64_t{second} << 32 | third; }
-    bool operator<(const OrderedTriangle& b) const { return key() != b.key() ? key() < b.key() : turned < b.turned; }
+    [[nodiscard]] bool turned() const { return (source & 1u) != 0; }
+    bool operator<(const OrderedTriangle& b) const {
+        return key() != b.key() ? key() < b.key() : turned() < b.turned();
+    }
 };
 
-/// Sorts triangles by smallest vertex, then by the others; of repeated ones keeps the first, with the largest stray.
+bool hasOwnNormals(std::span<const LatticeTriangle> soup) {
+    return std::ranges::any_of(soup, [](const LatticeTriangle& t) {
+        return t.own[0] != kUnknownNormal || t.own[1] != kUnknownNormal || t.own[2] != kUnknownNormal;
+    });
+}
+
+/// Returns a triangle's own normals at three of the mesh's vertices. `corners`: its corners' vertices.
+std::array<uint32_t, 3> ownNormals(const LatticeTriangle& t, std::span<const uint32_t> corners,
+                                   const std::array<uint32_t, 3>& vertices) {
+    std::array<uint32_t, 3> normals{};
+    for (size_t i = 0; i < 3; ++i)
+        for (size_t k = 0; k < 3; ++k)
+            if (corners[k] == vertices[i]) normals[i] = t.own[k];
+    return normals;
+}
+
+/// Sorts triangles by smallest vertex, then by the others; of repeated ones keeps the first, with the largest stray
+/// and the least own normals.
 void sortTriangles(std::span<const LatticeTriangle> soup, const std::vector<uint32_t>& corners, LatticeMesh& mesh) {
     std::vector<uint32_t> begin(mesh.positions.size() + 1, 0);
     for (size_t k = 0; k < soup.size(); ++k)
         ++begin[std::min({corners[3 * k], corners[3 * k + 1], corners[3 * k + 2]}) + 1];
     std::partial_sum(begin.begin(), begin.end(), begin.begin());
+    const bool withNormals = hasOwnNormals(soup);
     std::vector<OrderedTriangle> ordered(soup.size());
     std::vector<uint32_t> next(begin.begin(), begin.end() - 1);
     for (size_t k = 0; k < soup.size(); ++k) {
         std::array<uint32_t, 3> v{corners[3 * k], corners[3 * k + 1], corners[3 * k + 2]};
         std::rotate(v.begin(), std::min_element(v.begin(), v.end()), v.end());
         const bool turned = v[1] > v[2];
-        ordered[next[v[0]]++] = {std::min(v[1], v[2]), std::max(v[1], v[2]), soup[k].stray, turned};
+        ordered[next[v[0]]++] = {std::min(v[1], v[2]), std::max(v[1], v[2]), soup[k].stray, uint32_t(2 * k + turned)};
     }
     tbb::parallel_for(tbb::blocked_range<size_t>(0, begin.size() - 1, kGrain), [&](const auto& range) {
         for (size_t v = range.begin(); v < range.end(); ++v)
@@ -178,16 +201,23 @@ void sortTriangles(std::span<const LatticeTriangle> soup, const std::vector<uint
     });
     mesh.triangles.reserve(soup.size());
     mesh.stray.reserve(soup.size());
+    if (withNormals) mesh.cornerNormals.reserve(soup.size());
+    const auto ownOf = [&](const OrderedTriangle& t) {
+        const size_t k = t.source / 2;
+        return ownNormals(soup[k], std::span(corners).subspan(3 * k, 3), mesh.triangles.back());
+    };
     for (uint32_t v = 0; v + 1 < begin.size(); ++v) {
         const auto from = ordered.begin() + begin[v], to = ordered.begin() + begin[v + 1];
         for (auto t = from; t != to; ++t) {
             if (t != from && t->key() == (t - 1)->key()) {
                 mesh.stray.back() = std::max(mesh.stray.back(), t->stray);
+                if (withNormals) mesh.cornerNormals.back() = std::min(mesh.cornerNormals.back(), ownOf(*t));
                 continue;
             }
-            mesh.triangles.push_back(t->turned ? std::array<uint32_t, 3>{v, t->third, t->second}
-                                               : std::array<uint32_t, 3>{v, t->second, t->third});
+            mesh.triangles.push_back(t->turned() ? std::array<uint32_t, 3>{v, t->third, t->second}
+                                                 : std::array<uint32_t, 3>{v, t->second, t->third});
             mesh.stray.push_back(t->stray);
+            if (withNormals) mesh.cornerNormals.push_back(ownOf(*t));
         }
     }
 }
@@ -287,6 +317,29 @@ void computeNormals(LatticeMesh& mesh) {
         for (size_t v = range.begin(); v < range.end(); ++v)
             mesh.normals[v] = packGridNormal(normalGridPoint(sum[v]), crease[v] != 0);
     });
+}
+
+void settleNormals(LatticeMesh& mesh) {
+    const double nearest = std::pow(std::cos(glm::radians(kSettledDegrees)), 2);
+    std::atomic<bool> anyCounts = false;
+    tbb::parallel_for(tbb::blocked_range<size_t>(0, mesh.cornerNormals.size(), kGrain), [&](const auto& range) {
+        bool counts = false;
+        for (size_t k = range.begin(); k < range.end(); ++k) {
+            const auto& [a, b, c] = mesh.triangles[k];
+            const glm::dvec3 facet(areaNormal(mesh.positions[a], mesh.positions[b], mesh.positions[c]));
+            for (size_t i = 0; i < 3; ++i) {
+                uint32_t& own = mesh.cornerNormals[k][i];
+                if (own == kUnknownNormal) continue;
+                const glm::dvec3 n = f64::decodeNormal(own);
+                const glm::dvec3 computed = f64::cornerNormal(mesh.normals[mesh.triangles[k][i]], facet);
+                const double along = glm::dot(n, computed);
+                if (along * along >= nearest * glm::dot(n, n) * glm::dot(computed, computed)) own = kUnknownNormal;
+                counts |= own != kUnknownNormal;
+            }
+        }
+        if (counts) anyCounts = true;
+    });
+    if (!anyCounts) std::vector<std::array<uint32_t, 3>>().swap(mesh.cornerNormals);
 }
 
 }  // namespace vcp

@@ -26,6 +26,15 @@ struct LatticeMesh {
     std::vector<uint32_t> parts;  ///< that vertices belong to, as many as positions; empty: kClosedPart
     /// Where triangles are in images, one a triangle, corner by corner (addTextures); empty where there are none.
     std::vector<std::array<TexturePoint, 3>> textures;
+    /// The mesh's own normals (packDirection), one a triangle, corner by corner, where they count in place of those of
+    /// the vertices; kUnknownNormal where they do not, empty where none do.
+    std::vector<std::array<uint32_t, 3>> cornerNormals;
+
+    /// Returns the normal of a triangle's corner.
+    [[nodiscard]] uint32_t normalOf(size_t triangle, size_t corner) const {
+        const uint32_t own = cornerNormals.empty() ? kUnknownNormal : cornerNormals[triangle][corner];
+        return own != kUnknownNormal ? own : normals[triangles[triangle][corner]];
+    }
 
     /// Returns whether a triangle is of a closed part or of an open one, as PageEntry::parts says it.
     [[nodiscard]] uint8_t kindOf(uint32_t triangle) const {
@@ -44,8 +53,8 @@ inline constexpr int kMaxEdgeCells = 256;
 bool hasArea(glm::i32vec3 a, glm::i32vec3 b, glm::i32vec3 c);
 
 /// Makes the mesh of a bag of triangles, the same for any order of them: vertices by cell along the Morton curve,
-/// triangles by their vertices; of repeated triangles one stays, with the largest stray. Colours that differ at a
-/// vertex are averaged, triangle by triangle. Uses the calling arena's threads.
+/// triangles by their vertices; of repeated triangles one stays, with the largest stray and the least own normals.
+/// Colours that differ at a vertex are averaged, triangle by triangle. Uses the calling arena's threads.
 LatticeMesh meshOf(std::span<const LatticeTriangle> soup, bool withColour);
 
 /// Brings a mesh to the lattice that is half as fine. Vertices that do not lie on it are rounded down; what is made of
@@ -60,5 +69,12 @@ std::optional<uint32_t> findVertex(const LatticeMesh& mesh, glm::i32vec3 p);
 /// around which triangles with a sixteenth of the area turn away by more than 40 degrees is marked as a crease: its
 /// normal is not to be interpolated. Uses the calling arena's threads.
 void computeNormals(LatticeMesh& mesh);
+
+/// Own normals that are within so many degrees of the computed ones count as these, and cost nothing in the file.
+inline constexpr double kSettledDegrees = 2;
+
+/// Drops the mesh's own normals at corners where they are near the vertex' computed normal or, at a crease, near the
+/// triangle's. Uses the calling arena's threads.
+void settleNormals(LatticeMesh& mesh);
 
 }  // namespace vcp

@@ -44,6 +44,7 @@ Result<void> VertexStep::run(size_t bin, const LatticeMesh& mesh) {
         LatticeTriangle t{};
         t.stray = mesh.stray[k];
         if (!mesh.parts.empty()) t.part = mesh.parts[v[0]];
+        if (!mesh.cornerNormals.empty()) std::copy_n(mesh.cornerNormals[k].begin(), 3, t.own);
         for (int i = 0; i < 3; ++i) {
             const bool isOwn = binOf[v[i]] == bin;
             t.corner[i] = mesh.positions[v[i]];

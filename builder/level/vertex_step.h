@@ -1,9 +1,9 @@
 // The step from the snapped triangles to the finest level: a vertex stays where it is, and gets its normal and colour.
 //
 // A bin has all triangles at its own vertices, so it knows what becomes of these. The lowest bin that has one of a
-// triangle's corners hands the triangle on, with what it knows; each other bin that has a corner sends that vertex to
-// the same bins, which follow from the triangle. There both meet (joinVertices). So bins may be worked on in any
-// order, or at the same time on different machines.
+// triangle's corners hands the triangle on, with what it knows (kUnknownNormal elsewhere); each other bin that has a
+// corner sends that vertex to the same bins, which follow from the triangle. There both meet (joinVertices). So bins
+// may be worked on in any order, or at the same time on different machines.
 #pragma once
 
 #include <vector>
@@ -17,10 +17,6 @@
 #include "octree/io/result.h"
 
 namespace vcp {
-
-/// Stands for the normal of a corner that another bin knows. It lies between the points of the grid that normals are
-/// rounded to (octree/surface/vertex_normal.h), so none has this value.
-inline constexpr uint32_t kUnknownNormal = 2;
 
 class VertexStep {
 public:

@@ -12,6 +12,7 @@
 #include "builder/mesh/obj_materials.h"
 #include "builder/stream/chunk_room.h"
 #include "builder/stream/number_text.h"
+#include "builder/stream/spilled_array.h"
 
 namespace vcp {
 namespace {
@@ -53,7 +54,8 @@ public:
         : source_(std::move(source)),
           materials_(path, paintOf(options)),
           wanted_(options.coordinates),
-          mostCoordinates_(options.mostCoordinates) {
+          mostCoordinates_(options.mostCoordinates),
+          normals_(options.tempFolder) {
         info_.format = "OBJ";
         info_.fileBytes = source_.fileBytes();
         // The shortest vertex is "v 0 0 0\n".
@@ -162,6 +164,9 @@ private:
         } else if (end_ - p >= 2 && p[0] == 'f' && isBlank(p[1])) {
             ++p;
             VCP_TRY(readFace(p, chunk));
+        } else if (const char* const n = afterKeyword(p, "vn")) {
+            p = n;
+            VCP_TRY(readNormal(p));
         } else if (materials_.active()) {
             VCP_TRY(readPaint(p));
         } else if (const char* const q = wantsAll() ? afterKeyword(p, "vt") : nullptr) {
@@ -197,6 +202,26 @@ private:
             p = q;
             return materials_.addUv(numbers.values[0], numbers.values[1]);
         }
+        return {};
+    }
+
+    Result<void> readNormal(const char*& p) {
+        VertexNumbers numbers;
+        if (!readNumbers(p, numbers)) return normals_.append(kUnknownNormal);
+        return normals_.append(packDirection({numbers.values[0], numbers.values[1], numbers.values[2]}));
+    }
+
+    /// Adds the normals of the triangle that was just added.
+    Result<void> addNormals(const std::array<std::optional<uint64_t>, 3>& numbers, MeshChunk& chunk) {
+        if (normals_.size() == 0) return {};
+        std::array<uint32_t, 3> normals{kUnknownNormal, kUnknownNormal, kUnknownNormal};
+        // Those before the file's first normal have none.
+        chunk.cornerNormals.resize(chunk.triangles.size() - 1, normals);
+        for (size_t i = 0; i < 3; ++i) {
+            if (!numbers[i]) continue;
+            VCP_TRY_ASSIGN(normals[i], normals_.at(*numbers[i]));
+        }
+        chunk.cornerNormals.push_back(normals);
         return {};
     }
 
@@ -290,23 +315,26 @@ private:
         ++faces_;
         uint64_t first = 0;
         uint64_t last = 0;
-        std::array<std::optional<uint64_t>, 3> uvs;  // numbers for the first corner, the last and this one
+        // Numbers for the first corner, the last and this one.
+        std::array<std::optional<uint64_t>, 3> uvs, normals;
         for (size_t corner = 0; toWord(p); ++corner) {
             uint64_t vertex = 0;
-            VCP_TRY(readCorner(p, vertex, uvs[2]));
+            VCP_TRY(readCorner(p, vertex, uvs[2], normals[2]));
             if (corner == 0) first = vertex;
-            if (corner == 0) uvs[0] = uvs[2];
+            if (corner == 0) uvs[0] = uvs[2], normals[0] = normals[2];
             if (corner > 1) chunk.triangles.push_back({first, last, vertex});
+            if (corner > 1) VCP_TRY(addNormals(normals, chunk));
             if (corner > 1 && materials_.active()) VCP_TRY(materials_.paint(uvs, chunk));
             if (corner > 1 && wantsAll()) VCP_TRY(addCoordinates(uvs, chunk));
             last = vertex;
-            uvs[1] = uvs[2];
+            uvs[1] = uvs[2], normals[1] = normals[2];
         }
         return {};
     }
 
-    // Reads v, v/t, v//n or v/t/n; n does not matter, and t matters only for images.
-    Result<void> readCorner(const char*& p, uint64_t& vertex, std::optional<uint64_t>& uv) {
+    // Reads v, v/t, v//n or v/t/n; t matters only for images.
+    Result<void> readCorner(const char*& p, uint64_t& vertex, std::optional<uint64_t>& uv,
+                            std::optional<uint64_t>& normal) {
         int64_t number = 0;
         const char* stop = parseInteger(p, end_, number);
         if (!stop || !(endsWord(stop) || *stop == '/'))
@@ -320,17 +348,21 @@ private:
             promisedByte_ = byteAt(p);
         }
         const bool isOfUse = materials_.hasImages() || wantsAll();
-        uv = isOfUse && stop != end_ && *stop == '/' ? uvNumber(stop + 1) : std::nullopt;
-        while (!endsWord(stop)) ++stop;
+        const char* slash[2] = {nullptr, nullptr};
+        for (int i = 0; !endsWord(stop); ++stop)
+            if (*stop == '/' && i < 2) slash[i++] = stop;
+        const uint64_t uvsSeen = wantsAll() ? coordinates_.size() : materials_.uvCount();
+        uv = isOfUse && slash[0] ? numberAt(slash[0] + 1, uvsSeen) : std::nullopt;
+        normal = slash[1] ? numberAt(slash[1] + 1, normals_.size()) : std::nullopt;
         p = stop;
         return {};
     }
 
-    // Returns the number after the slash, from 0; nothing where there is none, or none yet.
-    std::optional<uint64_t> uvNumber(const char* p) const {
+    // Returns the number after a slash, from 0, of the `count` that came so far; nothing where there is none of these.
+    std::optional<uint64_t> numberAt(const char* p, uint64_t count) const {
         int64_t number = 0;
         if (!parseInteger(p, end_, number)) return std::nullopt;
-        const auto seen = int64_t(wantsAll() ? coordinates_.size() : materials_.uvCount());
+        const auto seen = int64_t(count);
         if (number == 0 || number < -seen || number > seen) return std::nullopt;
         return uint64_t(number > 0 ? number - 1 : seen + number);
     }
@@ -359,8 +391,9 @@ private:
     Coordinates wanted_;
     uint64_t mostCoordinates_;
     std::vector<glm::dvec2> coordinates_;  // when all are wanted
-    uint64_t lookedAtBytes_ = 0;           // the start of the file, where colours and materials are decided
-    double colourScale_ = 255.0;           // from the file's colours to 0..255
+    SpilledArray<uint32_t> normals_;
+    uint64_t lookedAtBytes_ = 0;  // the start of the file, where colours and materials are decided
+    double colourScale_ = 255.0;  // from the file's colours to 0..255
     uint64_t mostVertices_ = 0;
 
     const char* begin_ = nullptr;  // start of the window, which starts at the cursor

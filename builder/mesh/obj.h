@@ -1,4 +1,4 @@
-// Wavefront OBJ as a MeshStream: the statements `v` and `f`, and, for colours, `vt`, `mtllib` and `usemtl`; all
+// Wavefront OBJ as a MeshStream: the statements `v`, `vn` and `f`, and, for colours, `vt`, `mtllib` and `usemtl`; all
 // others are ignored.
 //
 // - `v x y z [w] [r g b]`: w is ignored (it weighs free-form curves only). Colours are 0..1, or 0..255 when a
@@ -6,6 +6,8 @@
 //   one; vertices without one are white then.
 // - `f v v v ...`, each as v, v/t, v//n or v/t/n; numbers count from 1, negative ones back from the latest
 //   vertex. Polygons become fans about their first vertex; those with fewer than three are skipped.
+// - `vn x y z`: a direction of any length. Normals that a face names before they come, and such as are no numbers or 0,
+//   are unknown.
 // - With MeshOpenOptions::coordinates all `vt` before a face count, and materials do not.
 // - Materials count when the MTL file is there (mtl.h), is named in the first 256 KiB, and has an image, or several
 //   different colours. Texture coordinates that a face names before they come are 0.

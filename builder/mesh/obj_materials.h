@@ -12,7 +12,7 @@
 
 #include "builder/mesh/mtl.h"
 #include "builder/stream/mesh_stream.h"
-#include "builder/stream/uv_array.h"
+#include "builder/stream/spilled_array.h"
 
 namespace vcp {
 
@@ -56,7 +56,7 @@ private:
     std::vector<SideFile> sideFiles_;
     bool unknownNamed_ = false;
     uint32_t current_ = kNoMaterial;
-    UvArray uvs_;
+    SpilledArray<glm::vec2> uvs_;
 };
 
 }  // namespace vcp

@@ -83,6 +83,11 @@ void planColours(const PlyElement& element, PlyPlan& plan) {
     }
 }
 
+void planNormals(const PlyElement& element, PlyPlan& plan) {
+    const auto x = scalarColumn(element, "nx"), y = scalarColumn(element, "ny"), z = scalarColumn(element, "nz");
+    if (x && y && z) plan.normalColumns = {*x, *y, *z};
+}
+
 Result<PlyPlan> planElement(const ByteSource& source, const PlyElement& element, uint64_t vertexCount) {
     PlyPlan plan;
     plan.element = &element;
@@ -96,6 +101,7 @@ Result<PlyPlan> planElement(const ByteSource& source, const PlyElement& element,
             plan.positionColumns[axis] = *column;
         }
         planColours(element, plan);
+        planNormals(element, plan);
     } else if (element.name == "face" || element.name == "tristrips") {
         plan.role = element.name == "face" ? PlyRole::Faces : PlyRole::Strips;
         const PlyProperty* list = element.find("vertex_indices");

@@ -24,6 +24,8 @@ public:
         }
         if (plan.role == PlyRole::Vertices) {
             for (int axis = 0; axis < 3; ++axis) columns_[plan.positionColumns[axis]].axis = axis;
+            for (int axis = 0; plan.normalColumns && axis < 3; ++axis)
+                columns_[(*plan.normalColumns)[size_t(axis)]].normalAxis = axis;
             for (int channel = 0; channel < 4; ++channel)
                 if (plan.colourColumns[channel]) columns_[*plan.colourColumns[channel]].channel = channel;
         }
@@ -61,6 +63,7 @@ private:
         bool isIndex = false;
         int axis = -1;     // 0..2: x, y, z
         int channel = -1;  // 0..3: red, green, blue, alpha
+        int normalAxis = -1;
         PlyType type = PlyType::Float32;
     };
 
@@ -79,7 +82,7 @@ private:
 
     Result<void> takeScalar(const char*& p) {
         const Column& column = columns_[column_++];
-        if (column.axis < 0 && column.channel < 0) {
+        if (column.axis < 0 && column.channel < 0 && column.normalAxis < 0) {
             p = wordEnd(p, end_);
             return {};
         }
@@ -89,6 +92,8 @@ private:
         if (column.axis >= 0) {
             if (!std::isfinite(value)) return notFinite(byteAt(p));
             position_[column.axis] = value;
+        } else if (column.normalAxis >= 0) {
+            normal_[column.normalAxis] = value;
         } else {
             const int shift = 8 * column.channel;
             colour_ = (colour_ & ~(0xFFu << shift)) | Rgba8{colourChannel(column.type, value)} << shift;
@@ -145,6 +150,7 @@ private:
         if (plan_.role == PlyRole::Vertices) {
             chunk.positions.push_back(position_);
             if (plan_.hasColour) chunk.colours.push_back(colour_);
+            if (plan_.normalColumns) chunk.normals.push_back(packDirection(normal_));
         }
         colour_ = 0xFF000000;
         column_ = 0;
@@ -158,7 +164,7 @@ private:
     size_t column_ = 0;  // columns_.size(): only the end of the line is left
     bool insideList_ = false;
     uint64_t listLeft_ = 0;
-    glm::dvec3 position_{0};
+    glm::dvec3 position_{0}, normal_{0};
     Rgba8 colour_ = 0xFF000000;
 };
 

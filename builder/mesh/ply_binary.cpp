@@ -210,6 +210,7 @@ private:
             return notFinite(firstNonFiniteByte(positions[finite], finite));
         }
         if (plan_.hasColour) decodeColours(p, rows, chunk);
+        if (plan_.normalColumns) decodeNormals(p, rows, chunk);
         return {};
     }
 
@@ -250,6 +251,12 @@ private:
             }
             chunk.colours[before + row] = colour;
         }
+    }
+
+    void decodeNormals(const char* p, size_t rows, MeshChunk& chunk) const {
+        const auto& [x, y, z] = *plan_.normalColumns;
+        for (size_t row = 0; row < rows; ++row, p += rowBytes_)
+            chunk.normals.push_back(packDirection({scalar(p, x), scalar(p, y), scalar(p, z)}));
     }
 
     double scalar(const char* row, size_t column) const {

@@ -8,6 +8,7 @@
 // - Polygons become fans about their first vertex; those with fewer than three vertices are skipped.
 // - In strips -1 (or, for uint, all ones) starts a new strip. Every second triangle is turned over; triangles
 //   that name a vertex twice only steer the strip and are skipped.
+// - Normals: directions of any length; those of length 0 or that are not finite are unknown.
 // - Colours: 8 bits as they are, ushort >> 8, float and double 0..1, other integers clamped to 0..255.
 #pragma once
 
@@ -34,6 +35,7 @@ struct PlyPlan {
     std::array<size_t, 3> positionColumns{};             ///< Vertices: x, y, z
     std::array<std::optional<size_t>, 4> colourColumns;  ///< Vertices: red, green, blue, alpha
     bool hasColour = false;
+    std::optional<std::array<size_t, 3>> normalColumns;  ///< Vertices: nx, ny, nz
 };
 
 /// Cuts the vertex numbers of one list after another into triangles.

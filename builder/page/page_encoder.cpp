@@ -203,22 +203,35 @@ private:
     uint32_t triangle(uint32_t global) {
         const auto& v = mesh_.triangles[global];
         const auto place = mesh_.textures.empty() ? std::array<TexturePoint, 3>{} : mesh_.textures[global];
-        draft_.triangles.push_back({vertex(v[0], place[0]), vertex(v[1], place[1]), vertex(v[2], place[2])});
+        const auto at = [&](size_t i) { return vertex(v[i], {mesh_.normalOf(global, i), place[i]}); };
+        draft_.triangles.push_back({at(0), at(1), at(2)});
         return uint32_t(draft_.triangles.size() - 1);
     }
 
-    /// Returns the number of a vertex: where triangles have it in different places of images, it is there for each.
-    uint32_t vertex(uint32_t global, const TexturePoint& place) {
+    /// What a triangle has at a corner of its own.
+    struct Corner {
+        uint32_t normal;
+        TexturePoint place;
+    };
+
+    /// Whether a vertex of the page is that of a corner.
+    [[nodiscard]] bool isOf(uint32_t number, const Corner& corner) const {
+        return draft_.normals[number] == corner.normal && points[number] == corner.place;
+    }
+
+    /// Returns the number of a vertex: where triangles have it with different normals, or in different places of
+    /// images, it is there for each.
+    uint32_t vertex(uint32_t global, const Corner& corner) {
         uint32_t number = local_.findOrAdd(global);  // plus 1
         const uint32_t first = number;
-        while (number != 0 && points[number - 1] != place) number = next_[number - 1];
+        while (number != 0 && !isOf(number - 1, corner)) number = next_[number - 1];
         if (number == 0) {
             const glm::i32vec3 p = mesh_.positions[global] - tree_.originLattice + kLatticeBias;
             draft_.vertices.push_back(pack21(uint32_t(p.x), uint32_t(p.y), uint32_t(p.z)));
             if (withMarks_ && mesh_.parts[global] == kOpenPart) draft_.vertices.back().y |= kVertexOpenBit;
-            draft_.normals.push_back(mesh_.normals[global]);
+            draft_.normals.push_back(corner.normal);
             if (!mesh_.colours.empty()) colours.push_back(mesh_.colours[global]);
-            points.push_back(place);
+            points.push_back(corner.place);
             next_.push_back(first);
             number = local_.findOrAdd(global) = uint32_t(draft_.vertices.size());
         }

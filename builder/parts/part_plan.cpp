@@ -47,9 +47,17 @@ json jsonOf(const PartPlan& plan) {
     json inputs = json::array();
     for (const PlannedInput& each : plan.inputs)
         inputs.push_back({{"path", each.path.string()}, {"stamp", each.stamp}, {"hash", each.hash}});
-    return {{"program", plan.program},  {"parts", plan.parts},    {"inputs", inputs}, {"output", o.output.string()},
-            {"overwrite", o.overwrite}, {"format", o.format},     {"cell", o.cell},   {"colour", int(o.colour)},
-            {"images", o.keepImages},   {"memory", o.memoryBytes}};
+    return {{"program", plan.program},
+            {"parts", plan.parts},
+            {"inputs", inputs},
+            {"output", o.output.string()},
+            {"overwrite", o.overwrite},
+            {"format", o.format},
+            {"cell", o.cell},
+            {"colour", int(o.colour)},
+            {"images", o.keepImages},
+            {"memory", o.memoryBytes},
+            {"vertex_normals", int(o.vertexNormals)}};
 }
 
 PartPlan planFrom(const json& j) {
@@ -67,6 +75,7 @@ PartPlan planFrom(const json& j) {
     plan.options.cell = j.at("cell").get<double>();
     plan.options.colour = ColourChoice(j.at("colour").get<int>());
     plan.options.keepImages = j.at("images").get<bool>();
+    plan.options.vertexNormals = VertexNormals(j.at("vertex_normals").get<int>());
     plan.options.memoryBytes = j.at("memory").get<uint64_t>();
     return plan;
 }

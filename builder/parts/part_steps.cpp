@@ -296,6 +296,7 @@ Result<void> runPages(const PartContext& context, unsigned number, NewPart& made
             VCP_TRY_ASSIGN(auto known, textures->load(bin));
             addTextures(mesh, std::move(known));
         }
+        settleNormals(mesh);
         VCP_TRY(buildBinPages(levels, mesh,
                               {.pass = levels.levels() - 1,
                                .first = levels.finest.first()[bin],

@@ -94,7 +94,7 @@ TriangleCutter::Source TriangleCutter::sourceOf(uint32_t triangle) const {
     source.secondGrows = glm::cross(c - a, cross) / squared;
     source.thirdGrows = glm::cross(cross, b - a) / squared;
     const glm::dvec3 flat = cross / std::sqrt(squared);
-    for (size_t i = 0; i < 3; ++i) source.normal[i] = f64::cornerNormal(mesh_.normals[t[i]], flat);
+    for (size_t i = 0; i < 3; ++i) source.normal[i] = f64::cornerNormal(mesh_.normalOf(triangle, i), flat);
     if (mesh_.colours.empty()) return source;
     for (size_t i = 0; i < 3; ++i)
         for (int k = 0; k < 4; ++k) source.colour[i][k] = double(mesh_.colours[t[i]] >> 8 * k & 255u) / 255;

@@ -25,6 +25,7 @@
 #include "builder/stream/material.h"
 #include "builder/stream/side_file.h"
 #include "octree/io/result.h"
+#include "octree/surface/vertex_normal.h"
 
 namespace vcp {
 
@@ -35,11 +36,14 @@ namespace vcp {
 struct MeshChunk {
     std::vector<glm::dvec3> positions;               ///< the next vertices, in file order, world units
     std::vector<Rgba8> colours;                      ///< as many as positions, or empty when the mesh has none
+    std::vector<uint32_t> normals;                   ///< as many as positions (packDirection), or empty
     std::vector<std::array<uint64_t, 3>> triangles;  ///< vertex numbers, 0-based over the whole mesh
     /// One for each triangle, or both are empty when the mesh has no materials. Texture coordinates of the corners: (0,
     /// 0) is the upper left corner of the image, v grows downwards; finite, 0 where the file has none.
     std::vector<std::array<glm::vec2, 3>> uvs;
     std::vector<uint32_t> materials;  ///< indices into MeshStream::materials(), or kNoMaterial
+    /// Normals of the corners, one for each triangle, or empty. Those of vertices count where these are kUnknownNormal.
+    std::vector<std::array<uint32_t, 3>> cornerNormals;
     /// OBJ with MeshOpenOptions::coordinates: texture coordinates of the corners in the order of the triangles, as the
     /// file has them, v growing upwards. Triangles without are left out, so there may be fewer than triangles.
     std::vector<std::array<glm::dvec2, 3>> coordinates;
@@ -47,9 +51,11 @@ struct MeshChunk {
     void clear() {
         positions.clear();
         colours.clear();
+        normals.clear();
         triangles.clear();
         uvs.clear();
         materials.clear();
+        cornerNormals.clear();
         coordinates.clear();
     }
 };

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 
 #include "octree/surface/leaf_math.h"
 
@@ -83,6 +84,15 @@ bool gridPointOf(uint32_t code, NormalGridPoint& point) {
     point.u = ((code & 0xfffeu) / 2 * kNormalSteps + 32767 / 2) / 32767;
     point.v = ((code >> 16) * kNormalSteps + 65535 / 2) / 65535;
     return packGridNormal(point, (code & kNormalCreaseBit) != 0) == code;
+}
+
+uint32_t packDirection(glm::dvec3 direction) {
+    const double size = std::max(std::abs(direction.x), std::max(std::abs(direction.y), std::abs(direction.z)));
+    const bool isFinite = std::isfinite(direction.x) && std::isfinite(direction.y) && std::isfinite(direction.z);
+    if (!isFinite || size == 0) return kUnknownNormal;
+    // Numbers below the normal ones have no inverse that is finite.
+    const glm::dvec3 unit = direction / size * double(1 << 30);
+    return packGridNormal(normalGridPoint(WideVector(glm::round(unit))), false);
 }
 
 }  // namespace vcp

@@ -39,4 +39,10 @@ NormalGridPoint normalGridPoint(WideVector sum);
 uint32_t packGridNormal(NormalGridPoint point, bool crease);
 bool gridPointOf(uint32_t code, NormalGridPoint& point);
 
+/// Stands for a normal that is not known. It lies between the points of the grid, so no packed normal has this value.
+inline constexpr uint32_t kUnknownNormal = 2;
+
+/// Packs a direction of any length; kUnknownNormal where it has none: of length 0, or not finite.
+uint32_t packDirection(glm::dvec3 direction);
+
 }  // namespace vcp

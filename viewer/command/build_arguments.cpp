@@ -23,6 +23,12 @@ std::optional<ColourChoice> colourNamed(const std::string& name) {
     return std::nullopt;
 }
 
+std::optional<VertexNormals> normalsNamed(const std::string& name) {
+    if (name == "mesh") return VertexNormals::Mesh;
+    if (name == "computed") return VertexNormals::Computed;
+    return std::nullopt;
+}
+
 std::optional<CoarseLeaves> leavesNamed(const std::string& name) {
     if (name == "slabs") return CoarseLeaves::Slabs;
     if (name == "mesh") return CoarseLeaves::Mesh;
@@ -51,6 +57,7 @@ void addBuildSettings(CLI::App& app, BuildOptions& options, const char* group) {
     addError(app, options);
     addColourChoice(app, options);
     addImages(app, options);
+    addVertexNormals(app, options);
     addParsed(app, "--leaves", options.coarseLeaves, leavesNamed, "slabs or mesh",
               "What coarser levels are made of: slabs (one plane a cell) or mesh (triangles of clustered vertices, and "
               "vectors at corners where they suffice; always with --error)")
@@ -88,6 +95,14 @@ void addImages(CLI::App& app, BuildOptions& options) {
         "--images", options.keepImages,
         "Keep the images of materials, too, as sharp as they are, with their place on the triangles; so far only "
         "`--device host` draws from them");
+}
+
+void addVertexNormals(CLI::App& app, BuildOptions& options) {
+    addParsed(app, "--vertex-normals", options.vertexNormals, normalsNamed, "mesh or computed",
+              "Normals that the surface is lit by: mesh (the file's own, where it has them) or computed (from the "
+              "triangles around a vertex)")
+        ->type_name("WHICH:{mesh,computed}")
+        ->default_str("mesh");
 }
 
 void addFormat(CLI::App& app, BuildOptions& options) {

@@ -20,6 +20,7 @@ void addBuildInputs(CLI::App& app, std::vector<std::string>& inputs, const std::
 void addBuildOutput(CLI::App& app, std::string& output);
 void addColourChoice(CLI::App& app, BuildOptions& options);
 void addImages(CLI::App& app, BuildOptions& options);
+void addVertexNormals(CLI::App& app, BuildOptions& options);
 void addFormat(CLI::App& app, BuildOptions& options);
 void addTempFolder(CLI::App& app, BuildOptions& options, const std::string& description);
 

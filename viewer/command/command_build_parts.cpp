@@ -109,6 +109,7 @@ Command addBuildPlan(CLI::App& vcp) {
     addCell(*app, command->settings.cell);
     addColourChoice(*app, command->settings);
     addImages(*app, command->settings);
+    addVertexNormals(*app, command->settings);
     addFormat(*app, command->settings);
     addMemory(*app, command->settings.memoryBytes,
               "Memory that each part may take: 512M, 4G, 50% [half of its machine's]");

@@ -26,7 +26,7 @@ constexpr std::string_view kExtension = ".vcp";
 constexpr std::string_view kListExtension = ".files";
 
 // A part of the key: it is raised when the same options build other bytes.
-constexpr int kCacheGeneration = 6;
+constexpr int kCacheGeneration = 7;
 
 // An unfinished build older than this is abandoned.
 constexpr auto kLeftoverAge = std::chrono::hours(24);
@@ -56,9 +56,10 @@ Result<std::string> identity(const fs::path& mesh) {
 
 /// Returns a hash of what is known of a dataset before it is built.
 Result<std::string> keyOf(const BuildOptions& options) {
-    std::string text = fmt::format("{}\n{}\n{}\n{}\n{}\n{}\n{}\n{}\n{}\n", kCacheGeneration, kFileVersion, options.cell,
-                                   options.error, options.errorIsRelative, int(options.colour),
-                                   int(options.coarseLeaves), options.keepImages, options.format);
+    std::string text =
+        fmt::format("{}\n{}\n{}\n{}\n{}\n{}\n{}\n{}\n{}\n{}\n", kCacheGeneration, kFileVersion, options.cell,
+                    options.error, options.errorIsRelative, int(options.colour), int(options.coarseLeaves),
+                    options.keepImages, int(options.vertexNormals), options.format);
     for (const fs::path& mesh : options.inputs) {
         VCP_TRY_ASSIGN(auto id, identity(mesh));
         text += id;

@@ -184,6 +184,7 @@ private:
                              fmt::format("the position of vertex {} is not finite (NaN or infinite)", vertex_));
             chunk.positions.emplace_back(v.position[0], v.position[1], v.position[2]);
             if (info_.hasColour) chunk.colours.push_back(v.colour);
+            if (reply_.hasNormals) chunk.normals.push_back(v.normal);
             ++vertex_;
         }
         return {};

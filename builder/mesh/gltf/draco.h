@@ -18,12 +18,12 @@
 
 namespace vcp {
 
-/// Which attributes to send: chosen by Draco's unique identifier, or, where `byIdentifier` is not set, the position and
-/// the first colour.
+/// Which attributes to send: chosen by Draco's unique identifier, or, where `byIdentifier` is not set, the position,
+/// the first colour and the first normals.
 struct DracoSelection {
     bool byIdentifier = false;
     uint32_t position = 0;
-    std::optional<uint32_t> colour, uv;
+    std::optional<uint32_t> colour, normal, uv;
     bool linearColour = false;  ///< colours are linear, as in glTF, and are encoded as sRGB
 };
 

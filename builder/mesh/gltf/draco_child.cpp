@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "builder/stream/colour_encoding.h"
+#include "octree/surface/vertex_normal.h"
 
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wconversion"
@@ -69,8 +70,14 @@ Rgba8 colourOf(const draco::PointAttribute& colours, draco::AttributeValueIndex 
     return packRgba({toByte(reals[0]), toByte(reals[1]), toByte(reals[2]), toByte(reals[3])});
 }
 
+uint32_t normalOf(const draco::PointAttribute& normals, draco::AttributeValueIndex value) {
+    std::array<float, 3> n{};
+    if (!normals.ConvertValue<float>(value, 3, n.data())) return kUnknownNormal;
+    return packDirection({n[0], n[1], n[2]});
+}
+
 void sendVertices(const draco::Mesh& mesh, const draco::PointAttribute& positions, const draco::PointAttribute* colours,
-                  bool linear, int pipe) {
+                  const draco::PointAttribute* normals, bool linear, int pipe) {
     std::vector<DracoVertex> batch;
     batch.reserve(kBatch);
     for (uint32_t i = 0; i < mesh.num_points(); ++i) {
@@ -78,6 +85,7 @@ void sendVertices(const draco::Mesh& mesh, const draco::PointAttribute& position
         DracoVertex vertex{};
         positions.ConvertValue<double>(positions.mapped_index(point), 3, vertex.position);
         if (colours) vertex.colour = colourOf(*colours, colours->mapped_index(point), linear);
+        if (normals) vertex.normal = normalOf(*normals, normals->mapped_index(point));
         batch.push_back(vertex);
         if (batch.size() == kBatch || i + 1 == mesh.num_points()) {
             send(pipe, batch.data(), batch.size() * sizeof(DracoVertex));
@@ -126,10 +134,13 @@ void decode(const DracoBytes& bytes, const DracoSelection& selection, int pipe) 
                                                    : mesh.GetNamedAttribute(draco::GeometryAttribute::POSITION);
     const auto* colours = selection.byIdentifier ? attribute(mesh, selection.colour, 3)
                                                  : mesh.GetNamedAttribute(draco::GeometryAttribute::COLOR);
+    const auto* normals = selection.byIdentifier ? attribute(mesh, selection.normal, 3)
+                                                 : mesh.GetNamedAttribute(draco::GeometryAttribute::NORMAL);
     const auto* const uvs = attribute(mesh, selection.uv, 2);
     if (!positions || positions->num_components() != 3)
         refuse(pipe, ErrorCode::InvalidInput, "has no positions of 3 components");
     if (colours && colours->num_components() < 3) colours = nullptr;
+    if (normals && normals->num_components() != 3) normals = nullptr;
     if (mesh.num_faces() == 0)
         refuse(pipe, ErrorCode::InvalidInput, "has no faces, only points; reconstruct a surface first");
 
@@ -138,8 +149,9 @@ void decode(const DracoBytes& bytes, const DracoSelection& selection, int pipe) 
     reply.faces = mesh.num_faces();
     reply.hasColour = colours != nullptr;
     reply.hasUv = uvs != nullptr;
+    reply.hasNormals = normals != nullptr;
     send(pipe, &reply, sizeof reply);
-    sendVertices(mesh, *positions, colours, selection.linearColour, pipe);
+    sendVertices(mesh, *positions, colours, normals, selection.linearColour, pipe);
     sendFaces(mesh, uvs, pipe);
 }
 

@@ -18,12 +18,14 @@ struct DracoReply {
     uint32_t messageBytes = 0;
     uint32_t hasColour = 0;
     uint32_t hasUv = 0;
+    uint32_t hasNormals = 0;
+    uint32_t unused = 0;
 };
 
 struct DracoVertex {
     double position[3];
     uint32_t colour;
-    uint32_t unused;
+    uint32_t normal;  ///< packDirection
 };
 
 struct DracoFace {
@@ -31,7 +33,7 @@ struct DracoFace {
     float uv[3][2];
 };
 
-static_assert(std::is_trivially_copyable_v<DracoReply> && sizeof(DracoReply) == 32);
+static_assert(std::is_trivially_copyable_v<DracoReply> && sizeof(DracoReply) == 40);
 static_assert(sizeof(DracoVertex) == 32 && sizeof(DracoFace) == 36);
 
 /// Decodes what `bytes` gives and writes it to the pipe. Never returns.

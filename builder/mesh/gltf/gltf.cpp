@@ -17,6 +17,7 @@
 #include "builder/stream/chunk_room.h"
 #include "builder/stream/colour_encoding.h"
 #include "builder/stream/data_uri.h"
+#include "octree/surface/leaf_math.h"
 
 namespace vcp {
 namespace {
@@ -232,6 +233,7 @@ private:
         DracoSelection selection{.byIdentifier = true,
                                  .position = *primitive.draco->position,
                                  .colour = primitive.draco->colour,
+                                 .normal = primitive.draco->normal,
                                  .uv = std::nullopt,
                                  .linearColour = true};
         if (hasImage(primitive)) selection.uv = primitive.draco->uv;
@@ -276,9 +278,20 @@ private:
             if (!chunk.uvs.empty()) std::swap(chunk.uvs[i][1], chunk.uvs[i][2]);
         }
         triangles_ += chunk.triangles.size();
+        turn(chunk.normals);
         colour(primitive, chunk);
         paint(primitive, chunk);
         return {};
+    }
+
+    // Normals go with the cofactors of the transform: where that is not singular, its inverse transposed, but for
+    // length.
+    void turn(std::vector<uint32_t>& normals) const {
+        const glm::dmat3 m(worldFromMesh_);
+        if (m == glm::dmat3(1)) return;
+        const glm::dmat3 cofactors(glm::cross(m[1], m[2]), glm::cross(m[2], m[0]), glm::cross(m[0], m[1]));
+        for (uint32_t& normal : normals)
+            if (normal != kUnknownNormal) normal = packDirection(cofactors * f64::decodeNormal(normal));
     }
 
     void colour(const GltfPrimitive& primitive, MeshChunk& chunk) const {

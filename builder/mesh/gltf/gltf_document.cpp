@@ -228,6 +228,7 @@ private:
         if (!position) return;  // "if it is not specified, other extensions should": nothing to see
         p.position = *position;
         p.colour = attributes.index("COLOR_0", accessors);
+        p.normal = attributes.index("NORMAL", accessors);
         p.indices = f.index("indices", accessors);
         p.material = f.index("material", document_.materials.size());
         if (!check_.ok()) return;
@@ -238,6 +239,7 @@ private:
         }
         readDraco(f, uvName, p);
         if (check_.ok()) checkPrimitive(f, p);
+        if (check_.ok()) checkNormals(p);
         if (check_.ok()) mesh.primitives.push_back(p);
     }
 
@@ -259,6 +261,7 @@ private:
         constexpr size_t kMostIds = 65536;
         compressed.position = attributes.index("POSITION", kMostIds);
         compressed.colour = attributes.index("COLOR_0", kMostIds);
+        compressed.normal = attributes.index("NORMAL", kMostIds);
         if (!uvName.empty()) compressed.uv = attributes.index(uvName.c_str(), kMostIds);
         if (!compressed.position) return f.fail("KHR_draco_mesh_compression has no POSITION");
         p.draco = compressed;
@@ -287,6 +290,16 @@ private:
                            indices.type == GltfComponent::Uint32;
         if (indices.components != 1 || !whole) f.fail("its indices are not unsigned whole numbers");
         if (isEmpty(indices)) f.fail(fmt::format("its {} indices have no data", indices.count));
+    }
+
+    // A surface is there without its normals.
+    void checkNormals(GltfPrimitive& p) {
+        if (!p.normal) return;
+        const GltfAccessor& a = document_.accessors[*p.normal];
+        if (a.components == 3 && a.count == document_.accessors[p.position].count && (p.draco || !isEmpty(a))) return;
+        document_.warnings.push_back(where_ + ": NORMAL does not fit its vertices; it is left out");
+        p.normal.reset();
+        if (p.draco) p.draco->normal.reset();
     }
 
     void countNodes(const JsonFields& top) {

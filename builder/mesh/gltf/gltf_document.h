@@ -95,7 +95,7 @@ struct GltfImage {
 /// KHR_draco_mesh_compression: the identifiers of the attributes.
 struct GltfDraco {
     uint32_t view = 0;
-    std::optional<uint32_t> position, colour, uv;
+    std::optional<uint32_t> position, colour, normal, uv;
 };
 
 enum class GltfMode : uint8_t { Triangles, Strip, Fan };
@@ -103,7 +103,7 @@ enum class GltfMode : uint8_t { Triangles, Strip, Fan };
 struct GltfPrimitive {
     GltfMode mode = GltfMode::Triangles;
     uint32_t position = 0;  ///< accessors
-    std::optional<uint32_t> colour, uv, indices;
+    std::optional<uint32_t> colour, normal, uv, indices;
     std::optional<uint32_t> material;
     std::optional<GltfDraco> draco;
 };

@@ -10,7 +10,7 @@
 
 #include "builder/stream/chunk_room.h"
 #include "builder/stream/colour_encoding.h"
-#include "builder/stream/uv_array.h"
+#include "builder/stream/spilled_array.h"
 
 namespace vcp {
 namespace {
@@ -26,6 +26,7 @@ public:
           positions_(document, buffers, primitive.position),
           uvs_(tempFolder) {
         if (primitive.colour) colours_.emplace(document, buffers, *primitive.colour);
+        if (primitive.normal) normals_.emplace(document, buffers, *primitive.normal);
         if (primitive.uv) uvValues_.emplace(document, buffers, *primitive.uv);
         if (primitive.indices) indices_.emplace(document, buffers, *primitive.indices);
         vertexEnd_ = vertices_;
@@ -48,6 +49,7 @@ public:
         vertexEnd_ = most + 1;
         positions_.skip(firstVertex_);
         if (colours_) colours_->skip(firstVertex_);
+        if (normals_) normals_->skip(firstVertex_);
         if (uvValues_) uvValues_->skip(firstVertex_);
         return {};
     }
@@ -83,6 +85,7 @@ private:
             chunk.positions.push_back(position);
         }
         if (colours_) VCP_TRY(readColours(count, chunk));
+        if (normals_) VCP_TRY(readNormals(count, chunk));
         if (!uvValues_) return {};
         VCP_TRY(uvValues_->read(count, values_));
         for (size_t i = 0; i < count; ++i) VCP_TRY(uvs_.append({float(values_[2 * i]), float(values_[2 * i + 1])}));
@@ -96,6 +99,13 @@ private:
             const double* const c = values_.data() + i * components;
             chunk.colours.push_back(encodeRgba({c[0], c[1], c[2], components == 4 ? c[3] : 1}));
         }
+        return {};
+    }
+
+    Result<void> readNormals(size_t count, MeshChunk& chunk) {
+        VCP_TRY(normals_->read(count, values_));
+        for (size_t i = 0; i < count; ++i)
+            chunk.normals.push_back(packDirection({values_[3 * i], values_[3 * i + 1], values_[3 * i + 2]}));
         return {};
     }
 
@@ -159,8 +169,8 @@ private:
     MeshInfo info_;
     uint64_t vertices_;
     GltfAccessorReader positions_;
-    std::optional<GltfAccessorReader> colours_, uvValues_, indices_;
-    UvArray uvs_;
+    std::optional<GltfAccessorReader> colours_, normals_, uvValues_, indices_;
+    SpilledArray<glm::vec2> uvs_;
     std::vector<double> values_;
     uint64_t firstVertex_ = 0;  // first vertex of those that are read
     uint64_t vertexEnd_ = 0;

@@ -12,9 +12,10 @@ namespace vcp {
 
 /// Reads vertices first, then triangles. Where a primitive has more vertices than corners (many may share one large
 /// accessor), only the range that its indices name is read. It has colours where the primitive has COLOR_0, as stored
-/// colours (sRGB); texture coordinates, as stored, where the primitive names an accessor for them. Not for primitives
-/// that Draco compressed. `document` and `buffers` must outlive the stream, which does not fill its info(). Errors:
-/// InvalidInput (index out of range, not finite), Io; without file where `buffers` cannot know it.
+/// colours (sRGB); normals where it has NORMAL; texture coordinates, as stored, where the primitive names an accessor
+/// for them. Not for primitives that Draco compressed. `document` and `buffers` must outlive the stream, which does not
+/// fill its info(). Errors: InvalidInput (index out of range, not finite), Io; without file where `buffers` cannot know
+/// it.
 Result<std::unique_ptr<MeshStream>> openGltfPrimitive(const GltfDocument& document, GltfBuffers& buffers,
                                                       const GltfPrimitive& primitive,
                                                       const std::filesystem::path& tempFolder);

@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "builder/stream/data_uri.h"
-#include "builder/stream/uv_array.h"
+#include "builder/stream/spilled_array.h"
 #include "tests/support/gltf_files.h"
 #include "tests/support/test_folder.h"
 
@@ -73,10 +73,10 @@ TEST(Spool, DamageIsNoticed) {
     }
 }
 
-TEST(UvArray, GivesWhatWasAppendedBeyondItsMemory) {
+TEST(SpilledArray, GivesWhatWasAppendedBeyondItsMemory) {
     TestFolder folder("vcp_uv");
-    UvArray array(folder.path(), 3);
-    constexpr uint64_t kCount = 10 * UvArray::kBlock + 17;
+    SpilledArray<glm::vec2> array(folder.path(), 3);
+    constexpr uint64_t kCount = 10 * SpilledArray<glm::vec2>::kBlock + 17;
     const auto uv = [](uint64_t i) { return glm::vec2(float(i), float(i % 97)); };
     std::mt19937_64 random(2);
     for (uint64_t i = 0; i < kCount; ++i) {
