@@ -21,15 +21,45 @@ void addCoordinates(const MeshChunk& chunk, size_t before, IndexedMesh& mesh) {
     if (mesh.coordinates.size() != mesh.triangles.size()) mesh.coordinates = {};
 }
 
+/// Gathers a file's normals, those of vertices and those of corners.
+class NormalCollector {
+public:
+    void add(const MeshChunk& chunk, size_t positions, size_t triangles) {
+        ofVertices_.insert(ofVertices_.end(), chunk.normals.begin(), chunk.normals.end());
+        ofVertices_.resize(positions, kUnknownNormal);
+        ofCorners_.insert(ofCorners_.end(), chunk.cornerNormals.begin(), chunk.cornerNormals.end());
+        ofCorners_.resize(triangles, {kUnknownNormal, kUnknownNormal, kUnknownNormal});
+    }
+
+    /// Returns them by corner. `triangles`: those of the file; `base`: number of its first vertex.
+    std::vector<std::array<uint32_t, 3>> byCorner(std::span<const std::array<uint32_t, 3>> triangles, uint64_t base) {
+        for (size_t k = 0; k < triangles.size(); ++k)
+            for (size_t i = 0; i < 3; ++i)
+                if (ofCorners_[k][i] == kUnknownNormal) ofCorners_[k][i] = ofVertices_[triangles[k][i] - base];
+        return std::move(ofCorners_);
+    }
+
+private:
+    std::vector<uint32_t> ofVertices_;
+    std::vector<std::array<uint32_t, 3>> ofCorners_;
+};
+
 Result<void> append(MeshStream& stream, const std::string& name, const LoadOptions& options, IndexedMesh& mesh,
                     size_t file = 0) {
+    const size_t firstTriangle = mesh.triangles.size();
+    NormalCollector normals;
     const uint64_t base = mesh.positions.size();
     const auto fail = [&](ErrorCode code, std::string message) {
         return Error{.code = code, .message = std::move(message), .file = name};
     };
     for (MeshChunk chunk;;) {
         VCP_TRY_ASSIGN(const bool more, stream.next(chunk));
-        if (!more) return {};
+        if (!more) {
+            if (!options.normals) return {};
+            const auto all = normals.byCorner(std::span(mesh.triangles).subspan(firstTriangle), base);
+            mesh.normals.insert(mesh.normals.end(), all.begin(), all.end());
+            return {};
+        }
         if (options.chunk) options.chunk(file, stream, chunk);
         if (mesh.positions.size() + chunk.positions.size() > options.mostPositions ||
             mesh.triangles.size() + chunk.triangles.size() > options.mostTriangles)
@@ -40,6 +70,7 @@ Result<void> append(MeshStream& stream, const std::string& name, const LoadOptio
         const size_t before = mesh.triangles.size();
         for (const auto& t : chunk.triangles)
             mesh.triangles.push_back({uint32_t(base + t[0]), uint32_t(base + t[1]), uint32_t(base + t[2])});
+        if (options.normals) normals.add(chunk, mesh.positions.size() - base, mesh.triangles.size() - firstTriangle);
         if (options.coordinates != Coordinates::OfMaterials) addCoordinates(chunk, before, mesh);
         if (options.coordinates == Coordinates::Required && mesh.coordinates.size() != mesh.triangles.size())
             return fail(ErrorCode::InvalidInput,

@@ -24,6 +24,8 @@ struct IndexedMesh {
     std::vector<std::array<uint32_t, 3>> triangles;  ///< numbers of positions
     /// Texture coordinates of the triangles' corners, v growing upwards; one for each triangle, or none.
     std::vector<std::array<glm::dvec2, 3>> coordinates;
+    /// The file's normals of the triangles' corners (packDirection), one for each triangle, or none.
+    std::vector<std::array<uint32_t, 3>> normals;
 
     [[nodiscard]] std::array<glm::dvec3, 3> corners(uint64_t triangle) const {
         const auto& t = triangles[triangle];
@@ -34,6 +36,7 @@ struct IndexedMesh {
 struct LoadOptions {
     /// OfMaterials: without coordinates. IfAny: where all triangles have them. Required: else it is an error.
     Coordinates coordinates = Coordinates::OfMaterials;
+    bool normals = false;  ///< whether the mesh gets its normals
     uint64_t mostTriangles = std::numeric_limits<uint32_t>::max();
     uint64_t mostPositions = std::numeric_limits<uint32_t>::max();
     /// Takes the part of the file that is read, from 0 to 1; returning false cancels.

@@ -18,8 +18,8 @@ constexpr uint32_t kLeastResident = 1 << 16;
 
 struct Indexed {
     std::vector<glm::dvec3> positions;
-    std::vector<uint32_t> colours;
-    std::vector<std::array<uint32_t, 3>> triangles;
+    std::vector<uint32_t> colours, normals;
+    std::vector<std::array<uint32_t, 3>> triangles, cornerNormals;
     std::vector<std::array<glm::vec2, 3>> uvs;
     std::vector<uint32_t> materials;
 };
@@ -32,6 +32,7 @@ Indexed randomMesh(uint32_t vertices, uint32_t triangles, uint32_t reach, uint64
     for (uint32_t v = 0; v < vertices; ++v) {
         mesh.positions.emplace_back(unit(random), double(v), unit(random));
         mesh.colours.push_back(uint32_t(random()));
+        mesh.normals.push_back(v % 5 == 0 ? kUnknownNormal : uint32_t(random()) | 4u);
     }
     for (uint32_t k = 0; k < triangles; ++k) {
         const uint64_t base = random() % vertices;
@@ -40,6 +41,7 @@ Indexed randomMesh(uint32_t vertices, uint32_t triangles, uint32_t reach, uint64
         mesh.triangles.push_back(t);
         mesh.uvs.push_back({glm::vec2(float(k), 0), glm::vec2(0, float(k)), glm::vec2(0.5f)});
         mesh.materials.push_back(k % 7);
+        mesh.cornerNormals.push_back({k % 3 == 0 ? kUnknownNormal : k | 4u, kUnknownNormal, k | 8u});
     }
     return mesh;
 }
@@ -56,6 +58,8 @@ std::vector<World> directJoin(const Indexed& mesh, bool withColour, bool withUv,
             const uint32_t v = mesh.triangles[k][i];
             t.corner[i] = mesh.positions[v];
             t.colour[i] = withColour ? mesh.colours[v] : 0xffffffffu;
+            const uint32_t own = withUv ? mesh.cornerNormals[k][size_t(i)] : kUnknownNormal;
+            t.normal[i] = own != kUnknownNormal || !withColour ? own : mesh.normals[v];
             if (withUv) t.uv[i] = mesh.uvs[k][i];
         }
         if (withUv) t.material = materialBase + mesh.materials[k] + 1;
@@ -92,7 +96,9 @@ protected:
             if (wantsVertices)
                 for (size_t end = std::min(mesh.positions.size(), v + 1 + random() % 60000); v < end; ++v) {
                     chunk.positions.push_back(mesh.positions[v]);
-                    if (withColour) chunk.colours.push_back(mesh.colours[v]);
+                    if (!withColour) continue;
+                    chunk.colours.push_back(mesh.colours[v]);
+                    chunk.normals.push_back(mesh.normals[v]);
                 }
             if (wantsTriangles)
                 for (size_t end = std::min(mesh.triangles.size(), k + 1 + random() % 60000); k < end; ++k) {
@@ -100,6 +106,7 @@ protected:
                     if (!withUv) continue;
                     chunk.uvs.push_back(mesh.uvs[k]);
                     chunk.materials.push_back(mesh.materials[k]);
+                    chunk.cornerNormals.push_back(mesh.cornerNormals[k]);
                 }
             VCP_TRY(join.add(chunk, 100));
         }

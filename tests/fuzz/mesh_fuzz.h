@@ -22,6 +22,11 @@ inline void require(bool holds, const char* what) {
     std::abort();
 }
 
+inline void requireNormal(uint32_t code) {
+    NormalGridPoint point{};
+    require(code == kUnknownNormal || (gridPointOf(code, point) && (code & 1u) == 0), "normals are of the grid");
+}
+
 struct Outcome {
     std::string error;
     std::vector<glm::dvec3> positions;
@@ -54,6 +59,12 @@ inline Outcome readMesh(Result<std::unique_ptr<MeshStream>> stream) {
         require(chunk.uvs.size() == chunk.materials.size() &&
                     (chunk.uvs.empty() || chunk.uvs.size() == chunk.triangles.size()),
                 "texture coordinates and a material for each triangle");
+        require(chunk.normals.empty() || chunk.normals.size() == chunk.positions.size(), "a normal for each vertex");
+        require(chunk.cornerNormals.empty() || chunk.cornerNormals.size() == chunk.triangles.size(),
+                "normals for each triangle");
+        for (const uint32_t normal : chunk.normals) requireNormal(normal);
+        for (const auto& corners : chunk.cornerNormals)
+            for (const uint32_t normal : corners) requireNormal(normal);
         for (const uint32_t material : chunk.materials)
             require(material == kNoMaterial || material < (*stream)->materials().size(), "materials are in range");
         require(chunk.positions.size() < 200'000 && chunk.triangles.size() < 2'000'000, "a chunk is bounded");

@@ -19,12 +19,15 @@ using Triangle = std::array<uint64_t, 3>;
 struct ReadMesh {
     std::vector<glm::dvec3> positions;
     std::vector<Rgba8> colours;
+    std::vector<uint32_t> normals;  // none, or of all vertices
     std::vector<Triangle> triangles;
+    std::vector<std::array<uint32_t, 3>> cornerNormals;  // of all triangles
     MeshInfo info;
     std::optional<Error> error;
 
     bool operator==(const ReadMesh& other) const {
-        return positions == other.positions && colours == other.colours && triangles == other.triangles &&
+        return positions == other.positions && colours == other.colours && normals == other.normals &&
+               triangles == other.triangles && cornerNormals == other.cornerNormals &&
                error.has_value() == other.error.has_value();
     }
     [[nodiscard]] std::string line() const { return error ? error->line() : ""; }
@@ -48,6 +51,8 @@ inline ReadMesh readAll(Result<std::unique_ptr<MeshStream>> stream) {
         }
         EXPECT_EQ(*more, !chunk.positions.empty() || !chunk.triangles.empty());
         EXPECT_TRUE(chunk.colours.empty() || chunk.colours.size() == chunk.positions.size());
+        EXPECT_TRUE(chunk.normals.empty() || chunk.normals.size() == chunk.positions.size());
+        EXPECT_TRUE(chunk.cornerNormals.empty() || chunk.cornerNormals.size() == chunk.triangles.size());
         EXPECT_GE((*stream)->bytesRead(), bytesBefore);
         if (mesh.info.fileBytes > 0) {
             EXPECT_LE((*stream)->bytesRead(), mesh.info.fileBytes);
@@ -56,7 +61,10 @@ inline ReadMesh readAll(Result<std::unique_ptr<MeshStream>> stream) {
         bytesBefore = (*stream)->bytesRead();
         mesh.positions.insert(mesh.positions.end(), chunk.positions.begin(), chunk.positions.end());
         mesh.colours.insert(mesh.colours.end(), chunk.colours.begin(), chunk.colours.end());
+        mesh.normals.insert(mesh.normals.end(), chunk.normals.begin(), chunk.normals.end());
         mesh.triangles.insert(mesh.triangles.end(), chunk.triangles.begin(), chunk.triangles.end());
+        mesh.cornerNormals.insert(mesh.cornerNormals.end(), chunk.cornerNormals.begin(), chunk.cornerNormals.end());
+        mesh.cornerNormals.resize(mesh.triangles.size(), {kUnknownNormal, kUnknownNormal, kUnknownNormal});
     }
     EXPECT_EQ(mesh.colours.size(), mesh.info.hasColour ? mesh.positions.size() : 0);
     if (mesh.info.vertices) {

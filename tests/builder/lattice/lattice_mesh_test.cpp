@@ -79,6 +79,62 @@ TEST(MeshOf, ColoursAreMeansOverTheTriangles) {
     EXPECT_EQ(mesh.colours, (std::vector<uint32_t>{0x80000003u, 0xff112131u, 1, 8}));
 }
 
+TEST(MeshOf, OwnNormalsStayWithTheirCorners) {
+    const glm::i32vec3 a{0, 0, 0}, b{9, 0, 0}, c{0, 9, 0}, d{9, 9, 0};
+    LatticeTriangle first = triangle(c, a, b), second = triangle(b, d, c), turned = triangle(a, c, b);
+    std::copy_n(std::array<uint32_t, 3>{30, 10, 20}.begin(), 3, first.own);
+    std::copy_n(std::array<uint32_t, 3>{10, 31, 20}.begin(), 3, turned.own);
+    const uint32_t none = kUnknownNormal;
+    std::vector<LatticeTriangle> soup{first, second, turned};
+    for (int turn = 0; turn < 3; ++turn) {
+        std::rotate(soup.begin(), soup.begin() + 1, soup.end());
+        LatticeMesh mesh = meshOf(soup, false);
+        ASSERT_EQ(mesh.triangles, (Triangles{{0, 1, 2}, {1, 3, 2}}));
+        // Of the triangle that is there twice, the least.
+        EXPECT_EQ(mesh.cornerNormals, (std::vector<std::array<uint32_t, 3>>{{10, 20, 30}, {none, none, none}}));
+        mesh.normals = {1, 5, 7, 9};
+        EXPECT_EQ(mesh.normalOf(0, 2), 30u);
+        EXPECT_EQ(mesh.normalOf(1, 2), 7u);
+    }
+    EXPECT_TRUE(meshOf(std::vector{second}, false).cornerNormals.empty());
+}
+
+TEST(SettleNormals, KeepsWhatIsTwoDegreesFromTheComputed) {
+    // A roof of two slopes, whose ridge is a crease, and a flat beside it.
+    const glm::i32vec3 p[] = {{0, 0, 0}, {900, 0, 900}, {0, 900, 0}, {1800, 0, 0}, {900, 900, 900}};
+    const std::vector<LatticeTriangle> soup{triangle(p[0], p[1], p[2]), triangle(p[1], p[4], p[2]),
+                                            triangle(p[1], p[3], p[4])};
+    const auto leaning = [](double degrees) {
+        const double a = glm::radians(45 + degrees);
+        return packDirection({-std::sin(a), 0, std::cos(a)});
+    };
+    for (const double degrees : {0.0, 1.8, -1.8, 2.2, -2.2, 60.0}) {
+        LatticeMesh mesh = meshOf(soup, false);
+        computeNormals(mesh);
+        mesh.cornerNormals.assign(3, {leaning(degrees), kUnknownNormal, leaning(degrees)});
+        const auto own = mesh.cornerNormals;
+        const bool counts = std::abs(degrees) > 2;
+        settleNormals(mesh);
+        ASSERT_EQ(mesh.cornerNormals.empty(), false) << "the other slope's";
+        size_t ofSlope = 0;
+        for (size_t k = 0; k < 3; ++k) {
+            const auto& [a, b, c] = mesh.triangles[k];
+            const WideVector n = areaNormal(mesh.positions[a], mesh.positions[b], mesh.positions[c]);
+            const bool isSlope = (n.x < 0) == (n.z > 0);
+            ofSlope += isSlope;
+            EXPECT_EQ(mesh.cornerNormals[k][1], kUnknownNormal);
+            for (const size_t i : {0, 2})
+                EXPECT_EQ(mesh.cornerNormals[k][i], !isSlope || counts ? own[k][i] : kUnknownNormal) << degrees;
+        }
+        EXPECT_EQ(ofSlope, 2u);
+    }
+    LatticeMesh mesh = meshOf(std::span(soup).first(2), false);
+    computeNormals(mesh);
+    mesh.cornerNormals.assign(2, {leaning(0), leaning(1), kUnknownNormal});
+    settleNormals(mesh);
+    EXPECT_TRUE(mesh.cornerNormals.empty()) << "none is left";
+}
+
 TEST(MeshOf, NothingIsEmpty) {
     const LatticeMesh mesh = meshOf({}, true);
     EXPECT_TRUE(mesh.positions.empty());

@@ -64,6 +64,22 @@ TEST(Obj, FacesMayComeBeforeTheirVertices) {
     EXPECT_EQ(mesh.triangles, (std::vector<Triangle>{{0, 1, 2}, {3, 2, 1}}));
 }
 
+TEST(Obj, NormalsBelongToCorners) {
+    const uint32_t x = packDirection({1, 0, 0}), y = packDirection({0, 1, 0}), z = packDirection({0, 0, 1}),
+                   none = kUnknownNormal;
+    const ReadMesh mesh = read(kSquare +
+                               "f 1 2 3\nvn 9 0 0\nvn 0 -1e-300 0\nvn 0 0 1e300\nvn 0 0 0\nvn nan 1 1\nvn 1 a 2\n"
+                               "f 1//1 2/7/2 3//3\nf 1//-6 2//-5 3//4\nf 1//5 2//6 3//7\nf 1 2/1 3//\n"
+                               "f 1//1 2//2 3//3 4//1\nf 1//0 2//-7 3//9999999999999999999\n");
+    ASSERT_FALSE(mesh.error) << mesh.line();
+    const std::vector<std::array<uint32_t, 3>> expected{{none, none, none}, {x, y, z},          {x, y, none},
+                                                        {none, none, none}, {none, none, none}, {x, y, z},
+                                                        {x, z, x},          {none, none, none}};
+    EXPECT_EQ(mesh.cornerNormals, expected);
+    EXPECT_TRUE(mesh.normals.empty());
+    EXPECT_TRUE(read("vn 0 0 1\n" + kSquare + "f 1 2 3\n").cornerNormals[0][0] == none);
+}
+
 struct BadCase {
     std::string text;
     std::string element;

@@ -117,6 +117,50 @@ std::string square(PlyEncoding encoding, std::initializer_list<double> face, Ply
 
 const std::vector<glm::dvec3> kSquare{{0, 0, 1}, {1, 0, 2}, {1, 1, 3}, {0, 1, 4}};
 
+TEST(Ply, NormalsOfEveryTypeAreDirections) {
+    for (const PlyEncoding encoding : kEncodings)
+        for (const PlyType type : kTypes) {
+            PlyWriter ply(encoding);
+            ply.header("element vertex 4");
+            for (const char* name : {"x", "y", "z"}) ply.header(std::string("property float ") + name);
+            for (const char* name : {"nz", "other", "nx", "ny"})
+                ply.header(std::string("property ") + nameOf(type) + " " + name);
+            ply.header("element face 1").header("property list uchar int vertex_indices").header("end_header");
+            const double normals[4][3] = {{0, 0, 7}, {3, 0, 0}, {0, 0, 0}, {1, 2, 3}};
+            for (const auto& n : normals)
+                ply.row().values(PlyType::Float32, {n[0], n[1], 1}).values(type, {n[2], 9, n[0], n[1]});
+            ply.row().list(PlyType::Uint8, PlyType::Int32, {0, 1, 2}).row();
+            const ReadMesh mesh = read(ply.text);
+            ASSERT_FALSE(mesh.error) << mesh.line();
+            EXPECT_EQ(mesh.normals, (std::vector<uint32_t>{packDirection({0, 0, 1}), packDirection({1, 0, 0}),
+                                                           kUnknownNormal, packDirection({1, 2, 3})}));
+        }
+}
+
+TEST(Ply, NormalsThatAreNoneAreUnknown) {
+    const double nan = std::numeric_limits<double>::quiet_NaN(), inf = std::numeric_limits<double>::infinity();
+    for (const PlyEncoding encoding : kEncodings) {
+        PlyWriter ply(encoding);
+        addVertexHeader(ply, 4);
+        for (const char* name : {"nx", "ny", "nz"}) ply.header(std::string("property double ") + name);
+        ply.header("element face 1").header("property list uchar int vertex_indices").header("end_header");
+        const double normals[4][3] = {{nan, 0, 1}, {0, -inf, 0}, {0, 1e308, 0}, {-5e-324, 0, 0}};
+        for (const auto& n : normals)
+            ply.row().values(PlyType::Float32, {0, 1, 2}).values(PlyType::Float64, {n[0], n[1], n[2]});
+        ply.row().list(PlyType::Uint8, PlyType::Int32, {0, 1, 2}).row();
+        EXPECT_EQ(read(ply.text).normals, (std::vector<uint32_t>{kUnknownNormal, kUnknownNormal,
+                                                                 packDirection({0, 1, 0}), packDirection({1, 0, 0})}));
+    }
+    // Two of three are not a normal.
+    PlyWriter ply(PlyEncoding::Ascii);
+    addVertexHeader(ply, 4);
+    ply.header("property float nx").header("property float ny");
+    ply.header("element face 1").header("property list uchar int vertex_indices").header("end_header");
+    for (int i = 0; i < 4; ++i) ply.row().values(PlyType::Float32, {0, 1, 2, 0, 1});
+    ply.row().list(PlyType::Uint8, PlyType::Int32, {0, 1, 2}).row();
+    EXPECT_TRUE(read(ply.text).normals.empty());
+}
+
 TEST(Ply, ReadsPositionsOfEveryType) {
     for (const PlyEncoding encoding : kEncodings) {
         for (const PlyType type : kTypes) {

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cmath>
+#include <limits>
 #include <random>
 #include <span>
 #include <vector>
@@ -37,6 +38,24 @@ TEST(VertexNormal, GridPointsComeBackAndAreNear) {
         const glm::dvec3 n = glm::normalize(glm::dvec3(sum)), m = f64::decodeNormal(code);
         ASSERT_LT(glm::length(glm::cross(n, m)), 0.00122) << "0.07 degrees";
     }
+}
+
+TEST(VertexNormal, DirectionsOfAnyLengthArePacked) {
+    std::mt19937 random(4);
+    std::normal_distribution<double> any;
+    for (int i = 0; i < 5000; ++i) {
+        const glm::dvec3 n = glm::normalize(glm::dvec3(any(random), any(random), i % 7 == 0 ? 0.0 : any(random)));
+        const uint32_t code = packDirection(n);
+        const glm::dvec3 m = f64::decodeNormal(code);
+        ASSERT_LT(glm::length(glm::cross(n, m)), 0.00122) << i;
+        ASSERT_EQ(packDirection(m), code) << i << ": packed again";
+        for (const double scale : {-1.0, 1e-300, 1e300, -1e-12}) ASSERT_EQ(packDirection(scale * n), code) << i;
+    }
+    const double inf = std::numeric_limits<double>::infinity();
+    for (const glm::dvec3& none : {glm::dvec3(0), glm::dvec3(1, inf, 0), glm::dvec3(-inf), glm::dvec3(0, inf - inf, 1)})
+        EXPECT_EQ(packDirection(none), kUnknownNormal);
+    NormalGridPoint point{};
+    EXPECT_FALSE(gridPointOf(kUnknownNormal, point));
 }
 
 TEST(VertexNormal, CreasesTurnByFortyDegrees) {

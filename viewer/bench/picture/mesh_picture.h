@@ -2,9 +2,10 @@
 //
 // The light is that of the shade pass (render/shaders/shade.comp) on white. Normals are the means, weighted by area, of
 // the triangles about a vertex, found by its position; across creases, where a sixteenth of them turns away from the
-// mean by more than 40 degrees, a triangle keeps its own (octree/surface/vertex_normal.h has the same rule). Samples
-// are added as light, and the sum is encoded in 8 bits, as the product's pictures are: without that, what rounding
-// leaves between the two counts as 0.01 of FLIP where nothing else differs.
+// mean by more than 40 degrees, a triangle keeps its own (octree/surface/vertex_normal.h has the same rule). Normals of
+// the mesh's file count in place of these. Samples are added as light, and the sum is encoded in 8 bits, as the
+// product's pictures are: without that, what rounding leaves between the two counts as 0.01 of FLIP where nothing else
+// differs.
 #pragma once
 
 #include <memory>

@@ -6,6 +6,8 @@
 
 #include <glm/geometric.hpp>
 
+#include "octree/surface/leaf_math.h"
+
 namespace vcp {
 
 namespace {
@@ -52,6 +54,11 @@ std::vector<glm::vec3> shadingNormals(const IndexedMesh& mesh) {
         for (int i = 0; i < 3; ++i) {
             const uint32_t at = place[mesh.triangles[t][i]];
             const bool isCrease = turned[at] > 0 && turned[at] >= kCreaseShare * glm::length(sums[at]);
+            const uint32_t own = mesh.normals.empty() ? kUnknownNormal : mesh.normals[t][size_t(i)];
+            if (own != kUnknownNormal) {
+                normals[3 * t + i] = glm::vec3(f64::cornerNormal(own, flat[t]));
+                continue;
+            }
             const glm::dvec3 n = isCrease ? flat[t] : glm::dot(sums[at], flat[t]) < 0 ? -sums[at] : sums[at];
             const double length = glm::length(n);
             normals[3 * t + i] = glm::vec3(length > 0 ? n / length : n);

@@ -48,7 +48,9 @@ Result<std::unique_ptr<BenchModel>> loadBenchModel(const std::filesystem::path& 
     auto model = std::make_unique<BenchModel>();
     model->files = files;
     VCP_TRY(report(fmt::format("{}: reading the mesh", files.name)));
-    VCP_TRY_ASSIGN(auto mesh, loadMesh(files.mesh, load));
+    LoadOptions withNormals = load;
+    withNormals.normals = true;
+    VCP_TRY_ASSIGN(auto mesh, loadMesh(files.mesh, withNormals));
     model->mesh = std::move(mesh);
     if (!std::filesystem::exists(files.vcp)) {
         VCP_TRY(report(fmt::format("{}: building", files.name)));

@@ -4,6 +4,7 @@
 
 #include <glm/geometric.hpp>
 
+#include "octree/surface/leaf_math.h"
 #include "tests/support/gltf_files.h"
 #include "tests/support/mesh_reading.h"
 #include "tests/support/test_folder.h"
@@ -56,6 +57,44 @@ TEST(Gltf, NodesMoveInDoubles) {
                                    {375999.25, 3790000.5, 0.125}, {376000.25, 3790001.5, 0.125}};
     for (size_t i = 0; i < 6; ++i) EXPECT_LT(glm::length(mesh.positions[i] - expected[i]), 1e-9) << i;
     EXPECT_EQ(mesh.triangles, (std::vector<Triangle>{{0, 1, 2}, {3, 5, 4}})) << "a mirror turns the triangle over";
+}
+
+TEST(Gltf, NormalsTurnWithTheirNodes) {
+    GltfFile file = oneTriangle();
+    const glm::dvec3 own[] = {{0, 0, 1}, {1, 1, 0}, {0, 0, 0}};
+    file.floats({0, 0, 1, 0.6f, 0.6f, 0, 0, 0, 0}, "VEC3", 3);
+    file.meshes = fmt::format(R"({{"primitives":[{{"attributes":{{"POSITION":0,"NORMAL":{}}}{}}}]}})",
+                              file.accessors.size() - 1, file.accessors.size() > 2 ? R"(,"indices":1)" : "");
+    // As it is; scaled unevenly; turned by 90 degrees about x, and mirrored.
+    file.nodes = R"({"mesh":0},{"mesh":0,"scale":[4,1,2]},)"
+                 R"({"matrix":[-1,0,0,0, 0,0,1,0, 0,-1,0,0, 0,0,0,1],"mesh":0})";
+    file.scene = "0,1,2";
+    const ReadMesh mesh = read(file.embedded());
+    ASSERT_FALSE(mesh.error) << mesh.line();
+    ASSERT_EQ(mesh.normals.size(), 9u);
+    const glm::dvec3 wanted[] = {own[0],    own[1],     {0, 0, 1},  {0, 0, 1}, {0.25, 1, 0},
+                                 {0, 0, 1}, {0, -1, 0}, {-1, 0, 1}, {0, 0, 1}};
+    for (size_t i = 0; i < 9; ++i) {
+        if (i % 3 == 2) {
+            EXPECT_EQ(mesh.normals[i], kUnknownNormal);
+            continue;
+        }
+        const glm::dvec3 n = f64::decodeNormal(mesh.normals[i]);
+        EXPECT_GT(std::abs(glm::dot(n, glm::normalize(wanted[i]))), std::cos(0.003)) << i;
+    }
+}
+
+TEST(Gltf, NormalsThatDoNotFitAreLeftOut) {
+    GltfFile file = oneTriangle();
+    file.floats({0, 0, 1, 0, 0, 1}, "VEC3", 2);
+    file.meshes =
+        fmt::format(R"({{"primitives":[{{"attributes":{{"POSITION":0,"NORMAL":{}}}}}]}})", file.accessors.size() - 1);
+    const ReadMesh mesh = read(file.embedded());
+    ASSERT_FALSE(mesh.error) << mesh.line();
+    EXPECT_TRUE(mesh.normals.empty());
+    const auto stream = open(ByteSource::fromMemory(file.embedded(), "mesh"));
+    ASSERT_EQ((*stream)->warnings().size(), 1u);
+    EXPECT_NE((*stream)->warnings()[0].find("NORMAL does not fit"), std::string::npos);
 }
 
 TEST(Gltf, StripsFansAndSequencesWithAnyIndexType) {
