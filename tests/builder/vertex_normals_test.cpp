@@ -161,7 +161,7 @@ TEST_F(VertexNormalsBuild, OfACoarseEllipsoidAreExact) {
     // Those within kSettledDegrees of the computed ones are these; the grid of normals and the lattice take the rest.
     EXPECT_LT(own.most, 2.2);
     EXPECT_GT(computed.most, 5);
-    EXPECT_LT(own.mean, computed.mean / 4);
+    EXPECT_LT(own.mean, computed.mean / 3);
 }
 
 TEST_F(VertexNormalsBuild, HardEdgesOfADrumStayHardAndItsSideRound) {

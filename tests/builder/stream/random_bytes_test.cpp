@@ -4,6 +4,7 @@
 #include <random>
 
 #include <gtest/gtest.h>
+#include <glm/vec2.hpp>
 
 #include "builder/stream/data_uri.h"
 #include "builder/stream/spilled_array.h"
