@@ -111,6 +111,7 @@ TEST_F(CommandLine, WrongUsageEndsWith2) {
         {{"build", mesh, "-o", "x.vcp", "--error", "-1"}, "--error"},
         {{"build", mesh, "-o", "x.vcp", "--threads", "0"}, "--threads"},
         {{"build", mesh, "-o", "x.vcp", "--colour", "mauve"}, "mauve"},
+        {{"build", mesh, "-o", "x.vcp", "--vertex-normals", "smooth"}, "mesh or computed"},
         {{"build", mesh, "-o", "x.vcp", "--progress", "loud"}, "loud"},
         {{"build", mesh, "-o", "x.vcp", "--unknown"}, "--unknown"},
         {{"info"}, "FILE"},

@@ -75,6 +75,7 @@ offers $'build\nbuild-plan\nbuild-step' vcp bui
 offers $'certified\npaper' vcp build --method ''
 offers paper vcp build x.ply --method p
 offers paper vcp build --method = p
+offers $'computed\nmesh' vcp build --vertex-normals ''
 offers --method vcp build --meth
 cd files
 offers $'a file.ply\nb.vcp\nfolder.d' vcp build ''
