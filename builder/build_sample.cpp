@@ -15,6 +15,7 @@
 #include <glm/common.hpp>
 
 #include "builder/ingest.h"
+#include "octree/surface/leaf_math.h"
 
 namespace vcp {
 
@@ -52,19 +53,28 @@ void put(std::string& bytes, const Value& value) {
     bytes.append(raw, sizeof raw);
 }
 
+/// Returns the direction of a packed normal; 0: unknown.
+glm::vec3 directionOf(uint32_t normal) {
+    return normal == kUnknownNormal ? glm::vec3(0) : glm::vec3(f64::decodeNormal(normal));
+}
+
 /// Writes a PLY file in which each triangle has vertices of its own.
 Result<void> writePly(const std::filesystem::path& path, const std::vector<BuildSample::Triangle>& triangles,
                       bool hasColour) {
+    const bool hasNormals = std::ranges::any_of(triangles, [](const BuildSample::Triangle& t) {
+        return std::ranges::any_of(t.normal, [](uint32_t n) { return n != kUnknownNormal; });
+    });
     std::string bytes = fmt::format(
         "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty double x\nproperty double y\nproperty "
-        "double z\n{}element face {}\nproperty list uchar uint vertex_indices\nend_header\n",
+        "double z\n{}{}element face {}\nproperty list uchar uint vertex_indices\nend_header\n",
         3 * triangles.size(),
         hasColour ? "property uchar red\nproperty uchar green\nproperty uchar blue\nproperty uchar alpha\n" : "",
-        triangles.size());
+        hasNormals ? "property float nx\nproperty float ny\nproperty float nz\n" : "", triangles.size());
     for (const BuildSample::Triangle& t : triangles)
         for (int i = 0; i < 3; ++i) {
             put(bytes, t.corner[i]);
             if (hasColour) put(bytes, t.colour[i]);
+            if (hasNormals) put(bytes, directionOf(t.normal[i]));
         }
     for (uint32_t i = 0; i < triangles.size(); ++i) {
         put(bytes, uint8_t{3});

@@ -10,6 +10,7 @@
 
 #include "builder/build.h"
 #include "builder/stream/material.h"
+#include "octree/surface/vertex_normal.h"
 
 namespace vcp {
 
@@ -20,6 +21,7 @@ public:
     struct Triangle {
         glm::dvec3 corner[3];  ///< world units
         Rgba8 colour[3];
+        uint32_t normal[3] = {kUnknownNormal, kUnknownNormal, kUnknownNormal};  ///< the mesh's own (packDirection)
     };
 
     /// `most`: triangles, unless all cubes but one have gone.

@@ -42,6 +42,10 @@ public:
             colours_.resize(positions_.size() - room, Rgba8(255));
             colours_.insert(colours_.end(), chunk.colours.begin(), chunk.colours.begin() + ptrdiff_t(room));
         }
+        if (!chunk.normals.empty()) {
+            normals_.resize(positions_.size() - room, kUnknownNormal);
+            normals_.insert(normals_.end(), chunk.normals.begin(), chunk.normals.begin() + ptrdiff_t(room));
+        }
         for (const glm::dvec3& p : chunk.positions) {
             measures_.boundsMin = glm::min(measures_.boundsMin, p);
             measures_.boundsMax = glm::max(measures_.boundsMax, p);
@@ -50,7 +54,8 @@ public:
         measures_.hasVertexColours |= !chunk.colours.empty();
         measures_.hasMaterials |= !chunk.materials.empty();
         measures_.triangles += chunk.triangles.size();
-        for (const auto& t : chunk.triangles) {
+        for (size_t k = 0; k < chunk.triangles.size(); ++k) {
+            const auto& t = chunk.triangles[k];
             if (std::max({t[0], t[1], t[2]}) >= positions_.size()) continue;
             const glm::dvec3 &a = positions_[t[0]], &b = positions_[t[1]], &c = positions_[t[2]];
             const double twice = glm::length(glm::cross(b - a, c - a));
@@ -59,7 +64,9 @@ public:
             if (twice > 0 && std::isfinite(twice) && std::isfinite(longest)) {
                 area_.add(twice / 2);
                 length_.add(longest);
-                sample_.add({{a, b, c}, {colourOf(t[0]), colourOf(t[1]), colourOf(t[2])}});
+                BuildSample::Triangle each{{a, b, c}, {colourOf(t[0]), colourOf(t[1]), colourOf(t[2])}};
+                for (size_t i = 0; i < 3; ++i) each.normal[i] = normalOf(chunk, k, i);
+                sample_.add(each);
             } else {
                 ++measures_.degenerateTriangles;
             }
@@ -73,13 +80,19 @@ private:
     [[nodiscard]] Rgba8 colourOf(uint64_t vertex) const {
         return vertex < colours_.size() ? colours_[vertex] : Rgba8(255);
     }
+    [[nodiscard]] uint32_t normalOf(const MeshChunk& chunk, size_t triangle, size_t corner) const {
+        const uint32_t own = chunk.cornerNormals.empty() ? kUnknownNormal : chunk.cornerNormals[triangle][corner];
+        const uint64_t vertex = chunk.triangles[triangle][corner];
+        return own == kUnknownNormal && vertex < normals_.size() ? normals_[vertex] : own;
+    }
 
     SoupMeasures& measures_;
     BuildSample& sample_;
     uint64_t maxVertices_;
     uint64_t measured_ = 0;
     std::vector<glm::dvec3> positions_;
-    std::vector<Rgba8> colours_;  ///< of the first positions; white beyond
+    std::vector<Rgba8> colours_;     ///< of the first positions; white beyond
+    std::vector<uint32_t> normals_;  ///< likewise; unknown beyond
     ExactSum area_, length_;
 };
 
@@ -154,7 +167,7 @@ Result<BuildEstimate> estimateBuild(const BuildOptions& options) {
     VCP_TRY_ASSIGN(auto inputs, expandInputs(options.inputs));
     for (const auto& path : inputs) {
         VCP_TRY_ASSIGN(auto stream, openMesh(path, meshOptionsOf(options)));
-        Measurer measurer(m, sample, plan.vertexBytes / (sizeof(glm::dvec3) + sizeof(Rgba8)));
+        Measurer measurer(m, sample, plan.vertexBytes / (sizeof(glm::dvec3) + sizeof(Rgba8) + sizeof(uint32_t)));
         for (;;) {
             VCP_TRY_ASSIGN(auto more, stream->next(chunk));
             if (!more) break;

@@ -12,6 +12,7 @@
 #include <glm/trigonometric.hpp>
 
 #include "builder/build.h"
+#include "builder/estimate.h"
 #include "builder/parts/build_parts.h"
 #include "octree/reference_caster.h"
 #include "octree/surface/leaf_math.h"
@@ -237,6 +238,17 @@ TEST_F(VertexNormalsBuild, IsTheSameHoweverItIsBuilt) {
             ASSERT_TRUE(step.ok()) << step.error().line();
         }
     EXPECT_EQ(contentOf(output()), whole) << "in parts";
+}
+
+TEST_F(VertexNormalsBuild, AnEstimateKnowsOfThem) {
+    const fs::path input = folder_ / "mesh.ply";
+    writePlyWithNormals(ellipsoid(100), input, [](glm::dvec3 p) { return p + glm::dvec3(1, 0, 0); });
+    for (const VertexNormals normals : {VertexNormals::Mesh, VertexNormals::Computed}) {
+        const auto estimate = estimateBuild(options(input, normals));
+        ASSERT_TRUE(estimate.ok()) << estimate.error().line();
+        const double bytes = double(built(options(input, normals)).size());
+        EXPECT_NEAR(double(estimate->fileBytes) / bytes, 1, 0.1);
+    }
 }
 
 }  // namespace
