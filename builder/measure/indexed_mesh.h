@@ -25,7 +25,7 @@ struct IndexedMesh {
     /// Texture coordinates of the triangles' corners, v growing upwards; one for each triangle, or none.
     std::vector<std::array<glm::dvec2, 3>> coordinates;
     /// The file's normals of the triangles' corners (packDirection), one for each triangle, or none.
-    std::vector<std::array<uint32_t, 3>> normals;
+    std::vector<std::array<uint32_t, 3>> normals = {};
 
     [[nodiscard]] std::array<glm::dvec3, 3> corners(uint64_t triangle) const {
         const auto& t = triangles[triangle];
