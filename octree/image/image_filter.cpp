@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 namespace vcp {
 
@@ -65,6 +66,12 @@ glm::ivec2 pairOf(int at, int size, uint32_t wrap) {
     return {f32::wrappedTexel(at, size, wrap), f32::wrappedTexel(at + 1, size, wrap)};
 }
 
+/// A place in a row of texels for which wrappedTexel is exact; those beyond, and what is no number, are taken for 0.
+float boundedPlace(float at) {
+    constexpr float kFar = 1 << 23;
+    return at >= -kFar && at <= kFar ? at : 0.0f;
+}
+
 /// Returns the largest whole number that is not above `x`; |x| < 2^31. (std::floor is a call on old processors.)
 int wholeBelow(float x) {
     const int whole = int(x);
@@ -75,7 +82,7 @@ int wholeBelow(float x) {
 void addBilinear(glm::vec4& sum, const ImageSet& set, const ImageSet::Level& level, ImageWraps wraps, glm::vec2 at,
                  float weight) {
     const int width = int(level.width), height = int(level.height);
-    const float x = at.x * float(width) - 0.5f, y = at.y * float(height) - 0.5f;
+    const float x = boundedPlace(at.x * float(width) - 0.5f), y = boundedPlace(at.y * float(height) - 0.5f);
     const int column = wholeBelow(x), row = wholeBelow(y);
     const float fx = x - float(column), fy = y - float(row);
     const glm::ivec2 columns = pairOf(column, width, wraps.u), rows = pairOf(row, height, wraps.v);
@@ -90,6 +97,9 @@ void addBilinear(glm::vec4& sum, const ImageSet& set, const ImageSet::Level& lev
 }  // namespace
 
 ImagePlaces placesOf(const ImageSet::Image& image, const f32::ImageFootprint& footprint) {
+    // Where coordinates change too fast for numbers, as on slivers, an image shows its mean.
+    const float size = footprint.length + footprint.width + std::abs(footprint.along.x) + std::abs(footprint.along.y);
+    if (!(size <= std::numeric_limits<float>::max())) return {.finer = image.levels.size() - 1};
     ImagePlaces places{.count = f32::footprintPlaces(footprint), .along = footprint.along};
     const float last = float(image.levels.size() - 1);
     const float level = std::clamp(f32::footprintLevel(footprint, places.count) - float(image.finest), 0.0f, last);

@@ -2,6 +2,7 @@
 // pictures of walls whose colours are known in closed form.
 #include <cmath>
 #include <functional>
+#include <limits>
 
 #include <gtest/gtest.h>
 
@@ -119,6 +120,26 @@ TEST(ImageFilter, IsItsDefinition) {
         const glm::dvec4 wanted = oracle(image, wraps, at, footprint);
         for (int c = 0; c < 4; ++c) EXPECT_NEAR(found[c], wanted[c], 2e-3) << c;
     }
+}
+
+TEST(ImageFilter, AnyNumbersAreRead) {
+    const ImageSet set = storedSet(test::randomImage(37, 21, 7));
+    const ImageSet::Image& image = set.images()[0];
+    constexpr float kInfinity = std::numeric_limits<float>::infinity(), kNan = std::numeric_limits<float>::quiet_NaN();
+    const float numbers[] = {0, 0.3f, -0.3f, 1e5f, -1e5f, 3e6f, 1e30f, -1e30f, kInfinity, -kInfinity, kNan};
+    for (const float u : numbers)
+        for (const float v : numbers)
+            for (const float along : numbers)
+                for (const float width : {0.0f, 1.0f, 1e6f, 1e30f, kInfinity, kNan})
+                    for (uint32_t wrap = 0; wrap < 3; ++wrap) {
+                        f32::ImageFootprint footprint;
+                        footprint.along = {along, u};
+                        footprint.length = std::abs(v);
+                        footprint.width = width;
+                        const glm::vec4 found =
+                            filteredColour(set, image, {wrap, (wrap + 1) % 3}, {u, v}, placesOf(image, footprint));
+                        for (int c = 0; c < 4; ++c) ASSERT_TRUE(found[c] >= 0 && found[c] <= 1.0001f) << found[c];
+                    }
 }
 
 TEST(ImageFilter, FootprintsAreThoseOfThePixel) {
