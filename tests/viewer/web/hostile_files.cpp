@@ -93,6 +93,7 @@ void change(std::span<std::byte> bytes, size_t first, std::mt19937_64& random) {
 /// Changes header, entries or stored pages.
 void changeStored(Bytes& input, std::mt19937_64& random) {
     const size_t entries = sizeof(FileHeader) + 2;
+    if (input.size() <= entries) return;  // it was cut off there
     switch (random() % 8) {
         case 0:
             change(std::span(input).first(entries), 0, random);
