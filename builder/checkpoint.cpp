@@ -192,11 +192,14 @@ Result<void> reopenSpools(std::deque<PageSpool>& spools, const SpoolLengths& len
 
 }  // namespace
 
+std::string settingsText(const BuildOptions& options) {
+    return fmt::format("{} {:a} {:a} {} {} {} {} {} {}", kFileVersion, options.cell, options.error,
+                       options.errorIsRelative, int(options.colour), int(options.coarseLeaves), options.keepImages,
+                       int(options.vertexNormals), options.format);
+}
+
 std::string buildFingerprint(const BuildOptions& options) {
-    std::string text =
-        fmt::format("{} {} {:a} {:a} {} {} {} {} {} {}", kTempVersion, kFileVersion, options.cell, options.error,
-                    options.errorIsRelative, int(options.colour), int(options.coarseLeaves), options.keepImages,
-                    int(options.vertexNormals), options.format);
+    std::string text = fmt::format("{} {}", kTempVersion, settingsText(options));
     for (const auto& input : options.inputs) {
         std::error_code ignored;
         const auto size = std::filesystem::file_size(input, ignored);

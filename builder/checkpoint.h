@@ -22,6 +22,9 @@
 
 namespace vcp {
 
+/// Returns the settings that a file's bytes depend on, and the version of files, as one line without its end.
+std::string settingsText(const BuildOptions& options);
+
 /// Returns what must be the same for a build to continue from an interrupted one.
 std::string buildFingerprint(const BuildOptions& options);
 

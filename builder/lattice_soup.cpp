@@ -142,8 +142,8 @@ std::optional<TexturedTriangle> LatticeSnapper::placeOf(const Piece& piece) cons
         // Far from the image, whole repetitions are left out: two at a time, since every other one may be mirrored.
         const bool isFar = low < -kMostRepetitions || high > kMostRepetitions;
         const double whole = isFar ? 2 * std::floor(low / 2) : 0;
-        const bool isKnown = std::isfinite(piece.uv[0][axis] + piece.uv[1][axis] + piece.uv[2][axis]);
-        if (!isKnown || !(high - whole <= 2 * kMostRepetitions)) return {};
+        const bool isFinite = std::isfinite(piece.uv[0][axis] + piece.uv[1][axis] + piece.uv[2][axis]);
+        if (!isFinite || high - whole > 2 * kMostRepetitions) return {};
         for (int i = 0; i < 3; ++i) {
             const double steps = std::ldexp(double(piece.uv[i][axis]) - whole, -kLog2TextureUnit - int(placed.shift));
             place.point[i][axis] = int32_t(std::floor(steps + 0.5)) * (1 << placed.shift);

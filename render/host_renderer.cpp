@@ -38,9 +38,8 @@ Result<void> HostRenderer::open(std::vector<PlacedDataset> datasets, std::span<c
     VCP_TRY(takeSurfaces(surfaces));
     const auto openAll = [&]() -> Result<void> {
         for (const PlacedDataset& placed : datasets) VCP_TRY(checkHostDraws(*placed.dataset, placed.source->name()));
-        VCP_TRY(readImages(datasets));
         RendererOptions left = options_;
-        for (const auto& images : images_) left.ramBytes -= images ? images->bytes() : 0;
+        VCP_TRY_ASSIGN(left.ramBytes, readImages(datasets));
         VCP_TRY_ASSIGN(left.budgetBytes, budgetOfPages(options_.budgetBytes, bytesOf(prepared_)));
         VCP_TRY_ASSIGN(datasets_, openResidencies(hostPageMemory(), left, std::move(datasets)));
         return {};
@@ -53,16 +52,17 @@ Result<void> HostRenderer::open(std::vector<PlacedDataset> datasets, std::span<c
     return {};
 }
 
-/// Images take at most half of the memory for pages on their way, all datasets together.
-Result<void> HostRenderer::readImages(std::span<const PlacedDataset> datasets) {
+/// Images take at most half of the memory for pages on their way, all datasets together; single texels may be beyond.
+Result<uint64_t> HostRenderer::readImages(std::span<const PlacedDataset> datasets) {
     images_.assign(datasets.size(), nullptr);
-    uint64_t left = options_.ramBytes / 2;
+    const uint64_t most = options_.ramBytes / 2;
+    uint64_t left = most;
     for (size_t i = 0; i < datasets.size(); ++i) {
         if (!options_.colour || !datasets[i].dataset->hasImages()) continue;
         VCP_TRY_ASSIGN(images_[i], datasets[i].source->readImages(left));
         left -= images_[i] ? std::min(images_[i]->bytes(), left) : 0;
     }
-    return {};
+    return options_.ramBytes - (most - left);
 }
 
 Result<void> HostRenderer::takeSurfaces(std::span<const MesoSurface> surfaces) {

@@ -37,8 +37,8 @@ private:
     explicit HostRenderer(const RendererOptions& options) : options_(options), info_(hostDevice()) {}
     /// Replaces the surfaces, without regard to the budget. Errors: as of prepareOnHost.
     Result<void> takeSurfaces(std::span<const MesoSurface> surfaces);
-    /// Reads the images of datasets. Errors: as of PageSource::readImages.
-    Result<void> readImages(std::span<const PlacedDataset> datasets);
+    /// Reads the images of datasets. Returns what they leave of the options' RAM. Errors: as of PageSource::readImages.
+    Result<uint64_t> readImages(std::span<const PlacedDataset> datasets);
     /// Returns the datasets as render() draws them.
     [[nodiscard]] std::vector<HostDataset> drawn(const FrameRequest& request) const;
 

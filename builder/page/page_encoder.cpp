@@ -222,20 +222,18 @@ private:
     /// Returns the number of a vertex: where triangles have it with different normals, or in different places of
     /// images, it is there for each.
     uint32_t vertex(uint32_t global, const Corner& corner) {
-        uint32_t number = local_.findOrAdd(global);  // plus 1
-        const uint32_t first = number;
-        while (number != 0 && !isOf(number - 1, corner)) number = next_[number - 1];
-        if (number == 0) {
-            const glm::i32vec3 p = mesh_.positions[global] - tree_.originLattice + kLatticeBias;
-            draft_.vertices.push_back(pack21(uint32_t(p.x), uint32_t(p.y), uint32_t(p.z)));
-            if (withMarks_ && mesh_.parts[global] == kOpenPart) draft_.vertices.back().y |= kVertexOpenBit;
-            draft_.normals.push_back(corner.normal);
-            if (!mesh_.colours.empty()) colours.push_back(mesh_.colours[global]);
-            points.push_back(corner.place);
-            next_.push_back(first);
-            number = local_.findOrAdd(global) = uint32_t(draft_.vertices.size());
-        }
-        return number - 1;
+        uint32_t& latest = local_.findOrAdd(global);  // plus 1
+        for (uint32_t number = latest; number != 0; number = next_[number - 1])
+            if (isOf(number - 1, corner)) return number - 1;
+        const glm::i32vec3 p = mesh_.positions[global] - tree_.originLattice + kLatticeBias;
+        draft_.vertices.push_back(pack21(uint32_t(p.x), uint32_t(p.y), uint32_t(p.z)));
+        if (withMarks_ && mesh_.parts[global] == kOpenPart) draft_.vertices.back().y |= kVertexOpenBit;
+        draft_.normals.push_back(corner.normal);
+        if (!mesh_.colours.empty()) colours.push_back(mesh_.colours[global]);
+        points.push_back(corner.place);
+        next_.push_back(latest);
+        latest = uint32_t(draft_.vertices.size());
+        return latest - 1;
     }
 
     const PageTree& tree_;

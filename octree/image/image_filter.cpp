@@ -42,8 +42,8 @@ private:
 
     static constexpr int kRoots = 1024;
     std::array<float, 256> lightOfByte_{};
-    std::array<float, kRoots + 2>
-        storedOfRoot_{};  // by the root of light, of which stored values are nearly a multiple
+    // By the root of light, of which stored values are nearly a multiple.
+    std::array<float, kRoots + 2> storedOfRoot_{};
 };
 
 /// Adds the light of four texels, weighted by their alpha.

@@ -80,9 +80,9 @@ struct PageView {
 
 /// Checks every word of a page, so that a traversal cannot leave it or loop: counts against the size, nodes
 /// form a tree of bounded depth, leaves and indices are in range. `bytes` must be 16-byte aligned; may be
-/// hostile. `colours` is empty or a colour page, with points
-/// or without; whether the file has their materials is not known here. Errors: InvalidInput, with the byte within the
-/// page.
+/// hostile. `colours` is empty or a colour page, with points or without; whether the file has their materials is not
+/// known here.
+/// Errors: InvalidInput, with the byte within the page.
 Result<PageView> parsePage(std::span<const std::byte> bytes, std::span<const std::byte> colours = {});
 
 /// Returns the view of a page that parsePage has accepted before, wherever its bytes lie now; checks nothing. `colours`

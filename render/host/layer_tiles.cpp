@@ -133,7 +133,6 @@ void LayerTiles::findAlbedo(const TileHits& hits, TileSurface& surface) const {
 }
 
 uint32_t LayerTiles::colourOf(HitColours& colours, const TileHits& hits, glm::ivec2 pixel, int i) const {
-    if (layer_.scene.images() == nullptr) return glm::packUnorm4x8(colourAt(layer_.scene, hits, i));
     return glm::packUnorm4x8(colours.at(i, [&] {
         return HitColours::PixelView{glm::vec3(rayOf(pixel).direction), pixelEdgeAt(depthInCells(hits.depth[i]))};
     }));

@@ -7,12 +7,12 @@
 #include <gtest/gtest.h>
 
 #include "builder/build.h"
-#include "builder/parts/build_parts.h"
 #include "builder/texture/texture.h"
 #include "octree/image/image_set.h"
 #include "octree/reference_caster.h"
 #include "octree/surface/packing.h"
 #include "octree/vcp_verify.h"
+#include "tests/support/build_in_parts.h"
 #include "tests/support/mesh_files.h"
 #include "tests/support/test_folder.h"
 #include "tests/support/test_meshes.h"
@@ -150,13 +150,7 @@ TEST_F(ImageBuild, IsResumedAndBuiltInParts) {
     fs::remove(output());
     BuildOptions o = options();
     o.overwrite = false;
-    const auto plan = planParts(o, 3);
-    ASSERT_TRUE(plan.ok()) << plan.error().line();
-    for (const PartStage& stage : stagesOf(3))
-        for (unsigned i = 0; i < stage.parts; ++i) {
-            const auto step = runPart({.folder = *plan, .stage = stage.name, .number = i, .threads = 2});
-            ASSERT_TRUE(step.ok()) << step.error().line();
-        }
+    ASSERT_NO_FATAL_FAILURE(test::buildInParts(o, 3));
     EXPECT_TRUE(contentOf(output()) == whole);
 }
 

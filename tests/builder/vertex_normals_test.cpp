@@ -13,12 +13,12 @@
 
 #include "builder/build.h"
 #include "builder/estimate.h"
-#include "builder/parts/build_parts.h"
 #include "octree/reference_caster.h"
 #include "octree/surface/leaf_math.h"
 #include "octree/surface/leaf_triangles.h"
 #include "octree/surface/packing.h"
 #include "octree/vcp_verify.h"
+#include "tests/support/build_in_parts.h"
 #include "tests/support/mesh_files.h"
 #include "tests/support/test_folder.h"
 #include "tests/support/test_meshes.h"
@@ -230,13 +230,7 @@ TEST_F(VertexNormalsBuild, IsTheSameHoweverItIsBuilt) {
     fs::remove(output());
     o = options(input);
     o.overwrite = false;
-    const auto plan = planParts(o, 3);
-    ASSERT_TRUE(plan.ok()) << plan.error().line();
-    for (const PartStage& stage : stagesOf(3))
-        for (unsigned i = 0; i < stage.parts; ++i) {
-            const auto step = runPart({.folder = *plan, .stage = stage.name, .number = i, .threads = 2});
-            ASSERT_TRUE(step.ok()) << step.error().line();
-        }
+    ASSERT_NO_FATAL_FAILURE(test::buildInParts(o, 3));
     EXPECT_EQ(contentOf(output()), whole) << "in parts";
 }
 

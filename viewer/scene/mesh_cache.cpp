@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include "builder/checkpoint.h"
 #include "octree/dataset_reader.h"
 #include "octree/io/content_hash.h"
 #include "octree/io/output_file.h"
@@ -56,10 +57,7 @@ Result<std::string> identity(const fs::path& mesh) {
 
 /// Returns a hash of what is known of a dataset before it is built.
 Result<std::string> keyOf(const BuildOptions& options) {
-    std::string text =
-        fmt::format("{}\n{}\n{}\n{}\n{}\n{}\n{}\n{}\n{}\n{}\n", kCacheGeneration, kFileVersion, options.cell,
-                    options.error, options.errorIsRelative, int(options.colour), int(options.coarseLeaves),
-                    options.keepImages, int(options.vertexNormals), options.format);
+    std::string text = fmt::format("{}\n{}\n", kCacheGeneration, settingsText(options));
     for (const fs::path& mesh : options.inputs) {
         VCP_TRY_ASSIGN(auto id, identity(mesh));
         text += id;
