@@ -25,7 +25,7 @@ public:
     Result<void> read(uint64_t offset, std::span<std::byte> out) const override {
         if (offset > bytes.size() || out.size() > bytes.size() - offset)
             return Error{.code = ErrorCode::Io, .message = "read past the end", .file = name_};
-        std::memcpy(out.data(), bytes.data() + offset, out.size());
+        std::copy_n(bytes.begin() + static_cast<ptrdiff_t>(offset), out.size(), out.begin());
         return {};
     }
     [[nodiscard]] uint64_t size() const override { return bytes.size(); }
