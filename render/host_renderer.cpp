@@ -34,14 +34,17 @@ Result<std::unique_ptr<HostRenderer>> HostRenderer::create(const RendererOptions
 
 Result<void> HostRenderer::open(std::vector<PlacedDataset> datasets, std::span<const MesoSurface> surfaces) {
     datasets_.clear();
-    images_.clear();
     VCP_TRY(takeSurfaces(surfaces));
     const auto openAll = [&]() -> Result<void> {
         for (const PlacedDataset& placed : datasets) VCP_TRY(checkHostDraws(*placed.dataset, placed.source->name()));
         RendererOptions left = options_;
-        VCP_TRY_ASSIGN(left.ramBytes, readImages(datasets));
+        DatasetImages images;
+        if (options_.colour) {
+            VCP_TRY_ASSIGN(images, readImages(datasets, options_.ramBytes / 2));
+        }
+        pageRam_ = left.ramBytes -= std::min(bytesOf(images), left.ramBytes / 2);
         VCP_TRY_ASSIGN(left.budgetBytes, budgetOfPages(options_.budgetBytes, bytesOf(prepared_)));
-        VCP_TRY_ASSIGN(datasets_, openResidencies(hostPageMemory(), left, std::move(datasets)));
+        VCP_TRY_ASSIGN(datasets_, openResidencies(hostPageMemory(), left, std::move(datasets), std::move(images)));
         return {};
     };
     if (auto opened = openAll(); !opened) {
@@ -50,19 +53,6 @@ Result<void> HostRenderer::open(std::vector<PlacedDataset> datasets, std::span<c
     }
     errorPixels_.assign(datasets_.size(), std::numeric_limits<double>::infinity());
     return {};
-}
-
-/// Images take at most half of the memory for pages on their way, all datasets together; single texels may be beyond.
-Result<uint64_t> HostRenderer::readImages(std::span<const PlacedDataset> datasets) {
-    images_.assign(datasets.size(), nullptr);
-    const uint64_t most = options_.ramBytes / 2;
-    uint64_t left = most;
-    for (size_t i = 0; i < datasets.size(); ++i) {
-        if (!options_.colour || !datasets[i].dataset->hasImages()) continue;
-        VCP_TRY_ASSIGN(images_[i], datasets[i].source->readImages(left));
-        left -= images_[i] ? std::min(images_[i]->bytes(), left) : 0;
-    }
-    return options_.ramBytes - (most - left);
 }
 
 Result<void> HostRenderer::takeSurfaces(std::span<const MesoSurface> surfaces) {
@@ -85,7 +75,7 @@ Result<void> HostRenderer::setSurfaces(std::span<const MesoSurface> surfaces) {
     if (datasets_.empty() || bytesOf(prepared_) == before) return {};
     const auto fit = [&]() -> Result<void> {
         VCP_TRY_ASSIGN(const auto pageBytes, budgetOfPages(options_.budgetBytes, bytesOf(prepared_)));
-        return sceneOf(datasets_)->setBudgets(hostPageMemory(), pageBytes, options_.ramBytes);
+        return sceneOf(datasets_)->setBudgets(hostPageMemory(), pageBytes, pageRam_);
     };
     auto fits = fit();
     if (!fits) VCP_TRY(takeSurfaces({}));
@@ -132,7 +122,7 @@ std::vector<HostDataset> HostRenderer::drawn(const FrameRequest& request) const 
                              .placement = datasets_[i].placement,
                              .number = uint32_t(i),
                              .errorPixels = errorPixels_[i],
-                             .images = images_[i].get()});
+                             .images = datasets_[i].images.get()});
     return drawn;
 }
 

@@ -37,15 +37,13 @@ private:
     explicit HostRenderer(const RendererOptions& options) : options_(options), info_(hostDevice()) {}
     /// Replaces the surfaces, without regard to the budget. Errors: as of prepareOnHost.
     Result<void> takeSurfaces(std::span<const MesoSurface> surfaces);
-    /// Reads the images of datasets. Returns what they leave of the options' RAM. Errors: as of PageSource::readImages.
-    Result<uint64_t> readImages(std::span<const PlacedDataset> datasets);
     /// Returns the datasets as render() draws them.
     [[nodiscard]] std::vector<HostDataset> drawn(const FrameRequest& request) const;
 
     const RendererOptions options_;
     const DeviceInfo info_;
     std::vector<PlacedResidency> datasets_;
-    std::vector<std::shared_ptr<const ImageSet>> images_;  // of each of them; null where there are none
+    uint64_t pageRam_ = 0;  // what images leave of the options' RAM
     std::vector<MesoSurface> surfaces_;
     std::vector<PreparedSurface> prepared_;  // of surfaces_
     bool surfacesChanged_ = false;           // since the last update

@@ -52,19 +52,41 @@ Result<void> checkBudget(uint64_t budgetBytes) {
                  .message = fmt::format("a budget of {} bytes is too small; at least {}", budgetBytes, kLeastBudget)};
 }
 
-Result<uint64_t> budgetOfPages(uint64_t budgetBytes, uint64_t surfaceBytes) {
-    if (surfaceBytes == 0) return budgetBytes;
-    const uint64_t left = budgetBytes > surfaceBytes ? budgetBytes - surfaceBytes : 0;
+Result<uint64_t> budgetOfPages(uint64_t budgetBytes, uint64_t otherBytes) {
+    if (otherBytes == 0) return budgetBytes;
+    const uint64_t left = budgetBytes > otherBytes ? budgetBytes - otherBytes : 0;
     if (checkBudget(left)) return left;
     return Error{.code = ErrorCode::Limit,
-                 .message = fmt::format("surfaces with mesostructure take {} bytes, and a budget of {} leaves too few "
-                                        "for the datasets beside them: allow more",
-                                        surfaceBytes, budgetBytes)};
+                 .message = fmt::format("surfaces with mesostructure and images take {} bytes, and a budget of {} "
+                                        "leaves too few for the datasets beside them: allow more",
+                                        otherBytes, budgetBytes)};
+}
+
+uint64_t budgetOfImages(uint64_t budgetBytes) {
+    return budgetBytes > kLeastBudget ? std::min(budgetBytes / 2, budgetBytes - kLeastBudget) : 0;
+}
+
+Result<DatasetImages> readImages(std::span<const PlacedDataset> datasets, uint64_t mostBytes) {
+    DatasetImages images(datasets.size());
+    uint64_t left = mostBytes;
+    for (size_t i = 0; i < datasets.size(); ++i) {
+        if (!datasets[i].dataset->hasImages()) continue;
+        VCP_TRY_ASSIGN(images[i], datasets[i].source->readImages(left));
+        left -= images[i] ? std::min(images[i]->bytes(), left) : 0;
+    }
+    return images;
+}
+
+uint64_t bytesOf(const DatasetImages& images) {
+    uint64_t bytes = 0;
+    for (const auto& each : images) bytes += each ? each->bytes() : 0;
+    return bytes;
 }
 
 Result<std::vector<PlacedResidency>> openResidencies(const PageMemorySource& memory, const RendererOptions& options,
-                                                     std::vector<PlacedDataset> placed) {
+                                                     std::vector<PlacedDataset> placed, DatasetImages images) {
     std::vector<PlacedResidency> opened;
+    images.resize(placed.size());
     if (placed.empty()) return opened;
     ResidencyOptions all;
     all.budgetBytes = options.budgetBytes;
@@ -89,7 +111,7 @@ Result<std::vector<PlacedResidency>> openResidencies(const PageMemorySource& mem
     }
     VCP_TRY_ASSIGN(auto scene, SceneResidency::create(memory, all, std::move(parts)));
     for (size_t i = 0; i < placed.size(); ++i)
-        opened.push_back({std::shared_ptr<Residency>(scene, &scene->dataset(i)), placed[i].placement});
+        opened.push_back({std::shared_ptr<Residency>(scene, &scene->dataset(i)), placed[i].placement, images[i]});
     return opened;
 }
 

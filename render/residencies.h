@@ -16,18 +16,30 @@ namespace vcp {
 struct PlacedResidency {
     std::shared_ptr<Residency> residency;  ///< with the scene's, as long as one of its datasets is kept
     Similarity placement;
+    std::shared_ptr<const ImageSet> images;  ///< of its file; null: the colours of vertices are shown
 };
+
+/// Images of datasets, one for each, null where it has none.
+using DatasetImages = std::vector<std::shared_ptr<const ImageSet>>;
+
+/// Reads the images of datasets. Where all together take more than `mostBytes`, the finest levels are left out; the
+/// coarsest level of each is always there. Errors: as of PageSource::readImages.
+Result<DatasetImages> readImages(std::span<const PlacedDataset> datasets, uint64_t mostBytes);
+/// Bytes of all images.
+uint64_t bytesOf(const DatasetImages& images);
 
 /// Refuses budgets that are too small for any page. Errors: Usage.
 Result<void> checkBudget(uint64_t budgetBytes);
 
-/// Returns what a budget leaves for pages beside surfaces with mesostructure. Errors: Limit (too little).
-Result<uint64_t> budgetOfPages(uint64_t budgetBytes, uint64_t surfaceBytes);
+/// Returns what a budget leaves for pages beside surfaces with mesostructure and images. Errors: Limit (too little).
+Result<uint64_t> budgetOfPages(uint64_t budgetBytes, uint64_t otherBytes);
+/// Returns the most bytes that images may take: half of a budget, as long as pages keep the least one.
+uint64_t budgetOfImages(uint64_t budgetBytes);
 
 /// Makes the datasets' residencies, whose one pool comes from `memory`, within options.budgetBytes and ramBytes.
-/// Errors: as of SceneResidency::create.
+/// `images`: none, or of each dataset, beside these budgets. Errors: as of SceneResidency::create.
 Result<std::vector<PlacedResidency>> openResidencies(const PageMemorySource& memory, const RendererOptions& options,
-                                                     std::vector<PlacedDataset> datasets);
+                                                     std::vector<PlacedDataset> datasets, DatasetImages images = {});
 
 /// Returns what the datasets share; null without any.
 SceneResidency* sceneOf(std::span<const PlacedResidency> datasets);

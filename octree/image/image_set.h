@@ -31,6 +31,8 @@ public:
     [[nodiscard]] std::span<const MaterialRow> materials() const { return materials_; }
     /// The texels of a level, RGBA8.
     [[nodiscard]] const uint32_t* texelsOf(const Level& level) const { return texels_.data() + level.first; }
+    /// The texels of all levels, image by image.
+    [[nodiscard]] std::span<const uint32_t> texels() const { return texels_; }
     [[nodiscard]] uint64_t bytes() const { return texels_.size() * sizeof(uint32_t); }
 
 private:

@@ -5,6 +5,11 @@
 // A pixel's footprint is an ellipse on the surface, and in the image. It is filtered at several places along it, each
 // from the two levels whose texels are as wide as it is (McCormack et al. 1999, "Feline"; Williams 1983).
 
+// Word of a page's header with the number of its vertices: behind their colours stand their points.
+const uint kPageHeaderVertices = 6u;
+// log2 of how many steps of a vertex's coordinates an image has across.
+const int kLog2TextureSteps = 20;
+
 const uint kWrapRepeat = 0u;
 const uint kWrapClamp = 1u;
 const uint kWrapMirror = 2u;
@@ -37,11 +42,11 @@ INLINE TextureSlope textureSlope(Real3 a, Real3 b, Real3 c, Real2 toB, Real2 toC
     return slope;
 }
 
-// A footprint in an image. `along`: its length as a step of coordinates; `length`, `width`: in texels.
+// A footprint in an image. `along`: its length as a step of coordinates; `longAxis`, `shortAxis`: of the ellipse, texels.
 struct ImageFootprint {
     Real2 along;
-    Real length;
-    Real width;
+    Real longAxis;
+    Real shortAxis;
 };
 
 // Surfaces that are seen more from the side than this are filtered as if they were not.
@@ -74,18 +79,18 @@ INLINE ImageFootprint imageFootprint(TextureSlope slope, Real3 n, Real3 directio
     Real scale = longest / sqrt(max(dot(towards, towards), Real(1e-30)));
     ImageFootprint footprint;
     footprint.along = towards * scale / size;
-    footprint.length = longest;
-    footprint.width = sqrt(max(mean - apart, Real(0.0)));
+    footprint.longAxis = longest;
+    footprint.shortAxis = sqrt(max(mean - apart, Real(0.0)));
     return footprint;
 }
 
 // Returns at how many places along a footprint the image is read.
 INLINE int footprintPlaces(ImageFootprint footprint) {
-    Real ratio = footprint.length / max(footprint.width, Real(1.0));
+    Real ratio = footprint.longAxis / max(footprint.shortAxis, Real(1.0));
     return int(clamp(floor(ratio + Real(0.5)), Real(1.0), Real(float(kMostFootprintPlaces))));
 }
 
 // Returns the level that suits each of so many places, 0 or more; its fraction is the share of the next coarser one.
 INLINE Real footprintLevel(ImageFootprint footprint, int places) {
-    return log2(max(max(footprint.width, footprint.length / Real(places)), Real(1.0)));
+    return log2(max(max(footprint.shortAxis, footprint.longAxis / Real(places)), Real(1.0)));
 }

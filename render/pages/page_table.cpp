@@ -2,11 +2,17 @@
 
 #include <algorithm>
 #include <bit>
+#include <cstddef>
 #include <unordered_map>
+
+#include "octree/surface/image_lookup.h"
 
 namespace vcp {
 
 namespace {
+
+static_assert(offsetof(PageHeader, vertices) == 4 * f32::kPageHeaderVertices &&
+              -kLog2TextureUnit == f32::kLog2TextureSteps);
 
 enum class Part : uint8_t { None, Above, Cut };
 
@@ -53,7 +59,8 @@ frame::TableRecord recordOf(const ResidentPage& page, uint64_t entry, uint8_t pa
     const PageSections sections = pageSections(page.header);
     const auto texelOf = [&](uint64_t byte) { return page.texel + uint32_t(byte / 16); };
     const uint32_t error = (std::bit_cast<uint32_t>(errorCells) + ~frame::kRecordErrorMask) & frame::kRecordErrorMask;
-    return {.node = {.flags = frame::kRecordResident | partFlags(parts) | error,
+    const uint32_t points = page.hasPoints ? frame::kRecordHasPoints : 0u;
+    return {.node = {.flags = frame::kRecordResident | partFlags(parts) | points | error,
                      .firstChild = 0,
                      .root = page.header.root,
                      .pageTexel = page.texel},
@@ -69,8 +76,8 @@ frame::TableRecord recordOf(const ResidentPage& page, uint64_t entry, uint8_t pa
 
 frame::TableRecord octantOf(const Dataset& dataset, const frame::TableRecord& page, uint32_t octant, uint32_t root) {
     frame::TableRecord record = page;
-    constexpr uint32_t kKept =
-        frame::kRecordErrorMask | frame::kRecordHasOpen | frame::kRecordIsOpen | frame::kRecordHasMarks;
+    constexpr uint32_t kKept = frame::kRecordErrorMask | frame::kRecordHasOpen | frame::kRecordIsOpen |
+                               frame::kRecordHasMarks | frame::kRecordHasPoints;
     record.node.flags =
         (page.node.flags & kKept) | frame::kRecordResident | frame::kRecordInCut | frame::kRecordIsOctant;
     record.node.firstChild = 0;

@@ -22,6 +22,7 @@ struct ResidentPage {
     std::array<uint32_t, 8> octants{};  ///< words of the octants' nodes, where the root is an internal node
     uint32_t texel = 0;                 ///< first texel in the page pool
     uint32_t colourTexel = 0;           ///< first texel of its colour in the same pool; 0 without colour
+    bool hasPoints = false;             ///< its vertices have points in images
 };
 
 /// Returns the records of the table, the root's first. `cut`: numbers of pages, none above another but those that are

@@ -95,10 +95,15 @@ std::vector<frame::TableRecord> Residency::table(ViewNumber number) {
     return pageTable(dataset(), cut(number), partial(number), [&](uint64_t page) -> std::optional<ResidentPage> {
         if (!scene_.policy_->isResident(first + page)) return {};
         const auto texel = uint32_t(slotOf(page).firstUnit * (kPoolUnitBytes / 16));
-        const bool colour = hasColour() && dataset().pages[page].colourBytes > 0;
+        const PageEntry& entry = dataset().pages[page];
+        const bool colour = hasColour() && entry.colourBytes > 0;
         const SceneResidency::PageRoot& root = scene_.roots_.at(first + page);
-        return ResidentPage{root.header, root.octants, texel,
-                            colour ? texel + dataset().pages[page].pageBytes / 16 : 0};
+        return ResidentPage{
+            .header = root.header,
+            .octants = root.octants,
+            .texel = texel,
+            .colourTexel = colour ? texel + entry.pageBytes / 16 : 0,
+            .hasPoints = colour && dataset().hasImages() && entry.colourBytes != colourPageBytes(root.header)};
     });
 }
 

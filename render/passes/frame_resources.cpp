@@ -43,6 +43,7 @@ constexpr Binding kBindings[] = {
     {kStorage, 1},
     {kStorage, 1},
     {kStorage, 1},
+    {kStorage, 1},
 };
 constexpr uint32_t kBindingCount = std::size(kBindings);
 
@@ -179,6 +180,10 @@ void FrameResources::setPools(const PagePool* pages, const PagePool* colours) {
     setStale_ = true;
 }
 
+void FrameResources::setImages(const Buffer* images) {
+    if (std::exchange(images_, images) != images) setStale_ = true;
+}
+
 void FrameResources::setFeedback(const Buffer* feedback) {
     if (feedback_ == feedback && feedbackHandle_ == feedback->handle()) return;
     feedback_ = feedback;
@@ -238,6 +243,7 @@ void FrameResources::writeSet() {
     useBuffer(18, 0, sums_ != nullptr ? *sums_ : none_.buffer);
     useBuffer(19, 0, shown_ != nullptr ? *shown_ : none_.buffer);
     useBuffer(20, 0, targetLight_ != nullptr ? *targetLight_ : none_.buffer);
+    useBuffer(21, 0, images_ != nullptr ? *images_ : none_.buffer);
 
     VkWriteDescriptorSet writes[kBindingCount];
     for (uint32_t i = 0; i < kBindingCount; ++i) {
@@ -328,8 +334,12 @@ Result<ComputePipeline> FrameResources::pipeline(std::span<const uint32_t> spirv
 
 Result<void> PipelineVariants::choose(FrameResources& resources, const PassConstants& c,
                                       std::initializer_list<uint32_t> more) {
-    std::vector<uint32_t> values{
-        c.access == PageAccess::TexelBuffer, c.poolChunks, c.chunkShift, c.colour, c.countSteps, c.falseColour};
+    std::vector<uint32_t> values{c.access == PageAccess::TexelBuffer,
+                                 c.poolChunks,
+                                 c.chunkShift,
+                                 uint32_t(c.colour) + uint32_t(c.colour && c.images),
+                                 c.countSteps,
+                                 c.falseColour};
     values.insert(values.end(), more.begin(), more.end());
     ComputePipeline& variant = variants_[values];
     if (variant.handle() == VK_NULL_HANDLE) {

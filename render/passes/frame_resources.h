@@ -17,6 +17,7 @@
 //           of their mean
 // 20        normals, lifts and light of   compose,           scene light, shade
 //           all datasets                  scene light
+// 21        images (passes/image_words.h) CPU (upload)       trace with images
 #pragma once
 
 #include <array>
@@ -47,7 +48,7 @@ struct PictureSize {
 struct PassConstants {
     PageAccess access = PageAccess::TexelBuffer;
     uint32_t poolChunks = 1, chunkShift = 26;
-    bool colour = false, countSteps = false, falseColour = false;
+    bool colour = false, images = false, countSteps = false, falseColour = false;
     bool operator==(const PassConstants&) const = default;
 };
 
@@ -113,6 +114,8 @@ public:
     void setBackground(std::vector<uint32_t> rows);
     /// Sets the pools; both may be the same. Null: nothing is shown, or nothing has colour.
     void setPools(const PagePool* pages, const PagePool* colours);
+    /// Sets the images of the dataset (image_words.h); null: none are read.
+    void setImages(const Buffer* images);
     /// Sets the feedback buffer: not null as long as frames with the feedback pass are drawn.
     void setFeedback(const Buffer* feedback);
 
@@ -176,6 +179,7 @@ private:
     WordBuffer tileStarts_, tileList_, hits_, table_, none_;
     const PagePool* pages_ = nullptr;
     const PagePool* colours_ = nullptr;
+    const Buffer* images_ = nullptr;
     const Buffer* feedback_ = nullptr;
     VkBuffer feedbackHandle_ = VK_NULL_HANDLE;  // as of the last call
     const Buffer* targetPicture_ = nullptr;

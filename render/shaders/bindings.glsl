@@ -16,7 +16,7 @@
 layout(constant_id = 0) const uint kTexelAccess = 1u;
 layout(constant_id = 1) const uint kPoolChunks = 1u;
 layout(constant_id = 2) const uint kChunkShift = 26u;  // log2 of 16-byte texels a chunk
-layout(constant_id = 3) const uint kColour = 0u;
+layout(constant_id = 3) const uint kColour = 0u;  // 1: vertices and cells have some; 2: triangles may have images, too
 layout(constant_id = 4) const uint kCountSteps = 0u;
 layout(constant_id = 5) const uint kFalseColour = 0u;
 
@@ -41,6 +41,7 @@ layout(set = 0, binding = 12) uniform utextureBuffer hitTexels;
 layout(set = 0, binding = 13, std430) writeonly buffer PictureBlock { uint picturePixels[]; };
 layout(set = 0, binding = 14, std430) buffer CounterBlock { FrameCounters counters; };
 layout(set = 0, binding = 15, std430) buffer FeedbackBlock { uint feedback[]; };
+layout(set = 0, binding = 21, std430) readonly buffer ImageBlock { uint imageWords[]; };  // images.glsl
 // clang-format on
 
 // A light as FrameConstants::lightDirection has it, and its bits of the part of the light that is seen: the one light

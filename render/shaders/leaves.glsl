@@ -1,6 +1,7 @@
 // Casts a ray against the leaves of a page, and finds what is seen of a hit.
 #include "octree/shared/leaf_math.h"
 #include "octree/shared/slab_blend.h"
+#include "render/shaders/images.glsl"
 #include "render/shaders/page_walk.glsl"
 
 const int kIllinoisSteps = 8;
@@ -268,6 +269,34 @@ Surface slabSurface(Hit hit, uint faces, uint colourFaces, vec3 direction) {
     return surface;
 }
 
+// Returns the colour of a hit on a triangle, from its image where it has one. `n`: the triangle's normal.
+vec4 triangleColour(Hit hit, vec3 a, vec3 b, vec3 c, vec3 n, uint colourVertices, vec3 direction) {
+    vec3 w = vec3(1.0 - hit.at.x - hit.at.y, hit.at.xy);
+    vec4 colour = vec4(0.0);
+    for (int i = 0; i < 3; i++)
+        colour +=
+            w[i] * unpackUnorm4x8(texelWord(fetchColour(colourVertices + (hit.corners[i] >> 2)), hit.corners[i] & 3u));
+    if (kColour < 2u) return colour;
+    TableNode record = fetchTableNode(hit.record);
+    bool hasPoints = (record.flags & kRecordHasPoints) != 0u;
+    while (hasPoints) {
+        uint vertices = fetchWord(record.pageTexel, kPageHeaderVertices);
+        ImagePoint first = fetchImagePoint(colourVertices, vertices, hit.corners.x);
+        bool hasImage = first.material != 0u && first.material <= imageWords[0];
+        while (hasImage) {
+            ImagedTriangle t = imagedTriangle(first, fetchImagePoint(colourVertices, vertices, hit.corners.y),
+                                              fetchImagePoint(colourVertices, vertices, hit.corners.z));
+            float pixelEdge = kFootprintPixels * pixelEdgeAt(hit.depth) *
+                              powerOfTwo(int(kLatticeBits) - int(frame.finestLevel) - hit.pageBits);
+            colour = imageColour(t, t.place + w.y * t.toB + w.z * t.toC, textureSlope(a, b, c, t.toB, t.toC), n,
+                                 direction, pixelEdge);
+            hasImage = false;
+        }
+        hasPoints = false;
+    }
+    return colour;
+}
+
 Surface hardSurface(Hit hit, TableSections sections, uint colourVertices, vec3 direction) {
     uvec3 corners = hit.corners;
     uvec2 a = fetchPair(sections.vertices, corners.x), b = fetchPair(sections.vertices, corners.y),
@@ -278,12 +307,9 @@ Surface hardSurface(Hit hit, TableSections sections, uint colourVertices, vec3 d
     flatNormal = turnedTo(flatNormal, -direction);
     vec3 w = vec3(1.0 - hit.at.x - hit.at.y, hit.at.xy);
     Surface surface = Surface(vec3(0.0), vec4(0.0));
-    for (int i = 0; i < 3; i++) {
+    for (int i = 0; i < 3; i++)
         surface.normal += w[i] * cornerNormal(fetchWord(sections.normals, corners[i]), flatNormal);
-        if (kColour != 0u)
-            surface.colour +=
-                w[i] * unpackUnorm4x8(texelWord(fetchColour(colourVertices + (corners[i] >> 2)), corners[i] & 3u));
-    }
+    if (kColour != 0u) surface.colour = triangleColour(hit, pa, pb, pc, flatNormal, colourVertices, direction);
     return surface;
 }
 

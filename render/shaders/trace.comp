@@ -50,7 +50,7 @@ bool isNewWall(Hit hit, float cell, vec3 direction, inout Wall before) {
 // Half the width of the line in which an open surface is cut, in pixels.
 const float kLinePixels = 1.0;
 // Planes that are seen from so near their edge, as a cosine, show no such lines.
-const float kLeastCosine = 1e-3;
+const float kLeastPlaneCosine = 1e-3;
 
 // Whether a hit has an open mark. The kind of leaf that none of the rays in lock step has hit is skipped.
 bool isMarkedOpen(Hit hit) {
@@ -113,8 +113,8 @@ bool isInside(Ray ray, inout Work work) {
 bool findInPlane(vec2 point, vec3 place, vec3 normal, out vec3 found) {
     Ray ray = rayAt(point);
     float along = dot(normal, ray.direction);
-    found = ray.origin + dot(normal, place - ray.origin) / min(along, -kLeastCosine) * ray.direction;
-    return along < -kLeastCosine;
+    found = ray.origin + dot(normal, place - ray.origin) / min(along, -kLeastPlaneCosine) * ray.direction;
+    return along < -kLeastPlaneCosine;
 }
 
 // Finds the cut of an open surface that is so near in the picture to a point of a section plane that its line covers

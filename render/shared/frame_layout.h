@@ -82,6 +82,7 @@ struct TableNode {
     // Bits 0..7: octants that have a child; bit 8: this page is in the cut; bit 9: it is resident, so that its fields
     // are there; bit 10: this is an octant of a page, which is drawn in the place of the page that would be here: all
     // but `root` is that page's; bits 11 and 12: it has open parts, and no others; bit 13: marks tell which are open;
+    // bit 14: its vertices have points in images;
     // bits 16..31: its certified error in finest cells, the upper half of a float, rounded up.
     uint flags;
     uint firstChild;  // number in the table
@@ -108,6 +109,7 @@ const uint kRecordIsOctant = 1024u;
 const uint kRecordHasOpen = 2048u;
 const uint kRecordIsOpen = 4096u;
 const uint kRecordHasMarks = 8192u;
+const uint kRecordHasPoints = 16384u;
 const uint kRecordErrorMask = 0xffff0000u;
 
 // The list of tiles to trace. Three words of an indirect dispatch, the count, then each tile's place: x + 2^16 y.

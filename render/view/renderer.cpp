@@ -69,7 +69,7 @@ Result<void> Renderer::setBudgets(uint64_t budgetBytes, uint64_t ramBytes) {
     VCP_TRY_ASSIGN(const auto pageBytes, s.pageBudget(budgetBytes));
     if (!s.datasets.empty()) {
         s.hidePool();
-        const auto done = sceneOf(s.datasets)->setBudgets(poolsOf(*s.device, s.access), pageBytes, ramBytes);
+        const auto done = sceneOf(s.datasets)->setBudgets(poolsOf(*s.device, s.access), pageBytes, s.pageRam(ramBytes));
         VCP_TRY(s.showPool());
         if (!done) return done;
     }

@@ -31,7 +31,8 @@ std::vector<HostDataset> Renderer::View::hostDatasets() const {
     std::vector<HostDataset> datasets;
     for (size_t i = 0; i < layers.size(); ++i)
         if (const Layer& layer = layers[i]; layer.residency != nullptr)
-            datasets.push_back({*layer.residency, layer.placement, uint32_t(i), layer.errorPixels, number});
+            datasets.push_back({*layer.residency, layer.placement, uint32_t(i), layer.errorPixels, number,
+                                shared->datasets[layer.number].images.get()});
     return datasets;
 }
 

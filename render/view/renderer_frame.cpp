@@ -30,6 +30,7 @@ PassConstants Renderer::View::constantsFor(const Layer& layer, const FrameReques
         c.poolChunks = poolOf(*residency).chunks();
         c.chunkShift = poolOf(*residency).chunkShift();
         c.colour = residency->hasColour();
+        c.images = shared->datasets[layer.number].images != nullptr;
     }
     c.falseColour = hasHitNumbers(request.shading.mode);
     c.countSteps = request.countSteps || showsWork(request.shading.mode);
@@ -84,6 +85,7 @@ Result<void> Renderer::View::prepare(Frame& frame, size_t i) {
     VCP_TRY(resources.resize({request.width, request.height}, hitPlanes(request, constants.colour)));
     resources.setBackground(backgroundRows(request));
     VCP_TRY(prepareTable(layer, drawing));
+    resources.setImages(constants.images ? &shared->images[layer.number] : nullptr);
     if (shared->composes()) {
         VCP_TRY(frame.target.resize(*shared->device, resources.size(), frame.isLit));
         resources.setTarget(&frame.layers.front().resources->picture(), &frame.target.depths(), frame.target.light());
@@ -440,6 +442,8 @@ Result<void> Renderer::View::submit(size_t which, const FrameRequest& request,
 }
 
 Result<void> Renderer::View::submitSteps(Frame& frame, bool one) {
+    for (const Layer& layer : layers)
+        if (layer.residency != nullptr) VCP_TRY(shared->needImages(layer.number));
     VCP_TRY_ASSIGN(auto commands, shared->device->beginCommands());
     barrierToAll(commands);
     std::optional<size_t> bound;  // the layer whose descriptor set is

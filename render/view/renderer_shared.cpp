@@ -44,21 +44,39 @@ Result<void> Renderer::Shared::uploadSurfaces() {
     return done;
 }
 
-Result<uint64_t> Renderer::Shared::pageBudget(uint64_t budgetBytes) const {
-    return budgetOfPages(budgetBytes, surfaceBytes());
+uint64_t Renderer::Shared::imageBytes() const {
+    uint64_t bytes = 0;
+    for (const PlacedResidency& placed : datasets) bytes += placed.images ? placed.images->bytes() : 0;
+    return bytes;
+}
+
+Result<void> Renderer::Shared::needImages(size_t dataset) {
+    if (!datasets[dataset].images) return {};
+    images.resize(datasets.size());
+    if (images[dataset].handle() != VK_NULL_HANDLE) return {};
+    VCP_TRY_ASSIGN(images[dataset], uploadImages(*device, *datasets[dataset].images));
+    return {};
 }
 
 Result<void> Renderer::Shared::addDatasets(std::vector<PlacedDataset> placed) {
     if (placed.empty()) return showPool();
     RendererOptions left = options;
-    VCP_TRY_ASSIGN(left.budgetBytes, pageBudget(options.budgetBytes));
-    VCP_TRY_ASSIGN(auto opened, openResidencies(poolsOf(*device, access), left, std::move(placed)));
+    VCP_TRY_ASSIGN(const auto beside, pageBudget(options.budgetBytes));
+    DatasetImages read;
+    if (options.colour) {
+        const uint64_t most = std::min({budgetOfImages(beside), options.ramBytes / 2, mostImageBytes(*device)});
+        VCP_TRY_ASSIGN(read, readImages(placed, most));
+    }
+    VCP_TRY_ASSIGN(left.budgetBytes, budgetOfPages(beside, bytesOf(read)));
+    left.ramBytes -= std::min(bytesOf(read), left.ramBytes / 2);
+    VCP_TRY_ASSIGN(auto opened, openResidencies(poolsOf(*device, access), left, std::move(placed), std::move(read)));
     std::move(opened.begin(), opened.end(), std::back_inserter(datasets));
     return showPool();
 }
 
 void Renderer::Shared::hidePool() {
     if (device) static_cast<void>(device->waitForAll());
+    images.clear();
     for (View* view : views) {
         for (View::Layer& layer : view->layers) layer.dataset = layer.residency = nullptr;
         for (View::Frame& frame : view->frames) {
@@ -96,6 +114,7 @@ void Renderer::Shared::clearPipelines() {
 Result<void> Renderer::Shared::rebuild(View& asked) {
     ++losses;
     for (View* view : views) view->release();
+    images.clear();
     SceneResidency* const scene = sceneOf(datasets);
     if (scene != nullptr) scene->releasePool();
     clearPipelines();
@@ -124,7 +143,7 @@ bool Renderer::Shared::recover(View& asked, bool mayRebuild) {
     SceneResidency& scene = *sceneOf(datasets);
     if (!scene.hasPool()) return false;
     // A pool that the coarsest pages fill stays as it is.
-    const auto done = scene.setBudgets(poolsOf(*device, access), scene.pages().bytes() / 2, options.ramBytes);
+    const auto done = scene.setBudgets(poolsOf(*device, access), scene.pages().bytes() / 2, pageRam(options.ramBytes));
     if (!done && done.error().code != ErrorCode::Limit) return false;
     return showPool().ok() && done.ok();
 }

@@ -10,6 +10,7 @@
 #include "render/passes/beam.h"
 #include "render/passes/compose.h"
 #include "render/passes/feedback.h"
+#include "render/passes/image_words.h"
 #include "render/passes/light.h"
 #include "render/passes/meso_surface.h"
 #include "render/passes/paper_trace.h"
@@ -31,6 +32,7 @@ struct Renderer::Shared {
     PageAccess access = PageAccess::TexelBuffer;
     uint32_t stripes = 1;
     std::vector<PlacedResidency> datasets;
+    std::vector<Buffer> images;                // of the datasets, on the device, where a pass has read them
     std::pair<uint32_t, uint32_t> poolLayout;  // chunks and their shift, which the pipelines were made for
     uint32_t losses = 0;
     // Views record their frames one after the other, so one set of pipelines is enough for all.
@@ -67,8 +69,17 @@ struct Renderer::Shared {
     }
     /// Bytes of the surfaces, which the budget pays for before pages.
     [[nodiscard]] uint64_t surfaceBytes() const { return meso && meso->pass ? meso->pass->assetBytes() : 0; }
-    /// Returns what the surfaces leave of a budget for pages. Errors: Limit, where that is too little.
-    Result<uint64_t> pageBudget(uint64_t budgetBytes) const;
+    /// Bytes of the datasets' images.
+    [[nodiscard]] uint64_t imageBytes() const;
+    /// Copies the images of a dataset to the device, unless they are there or there are none; waits for it. Not while
+    /// commands are recorded. Errors: Device.
+    Result<void> needImages(size_t dataset);
+    /// Returns what the surfaces and the images leave of a budget for pages. Errors: Limit, where that is too little.
+    Result<uint64_t> pageBudget(uint64_t budgetBytes) const {
+        return budgetOfPages(budgetBytes, surfaceBytes() + imageBytes());
+    }
+    /// Returns what the images leave of the memory for pages on their way.
+    [[nodiscard]] uint64_t pageRam(uint64_t ramBytes) const { return ramBytes - std::min(imageBytes(), ramBytes / 2); }
     /// Opens datasets beside those that are open, and shows all. After an error none is added. Errors: as of
     /// Renderer::open.
     Result<void> addDatasets(std::vector<PlacedDataset> placed);

@@ -94,6 +94,7 @@ void Renderer::View::bindPools(Frame& frame) {
         const Residency* residency = i < layers.size() ? layers[i].residency : nullptr;
         const PagePool* pool = residency != nullptr ? &poolOf(*residency) : nullptr;
         frame.layers[i].resources->setPools(pool, pool != nullptr && residency->hasColour() ? pool : nullptr);
+        frame.layers[i].resources->setImages(nullptr);
     }
 }
 

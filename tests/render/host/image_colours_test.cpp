@@ -43,9 +43,9 @@ int64_t wrapped(int64_t at, int64_t size, uint32_t wrap) {
 /// The filter as its definition says, in double precision.
 glm::dvec4 oracle(const LevelledImage& image, ImageWraps wraps, glm::dvec2 at, const f64::ImageFootprint& footprint) {
     const auto levels = imageLevels(image.width, image.height, 0);
-    const int places = std::clamp(int(std::floor(footprint.length / std::max(footprint.width, 1.0) + 0.5)), 1,
+    const int places = std::clamp(int(std::floor(footprint.longAxis / std::max(footprint.shortAxis, 1.0) + 0.5)), 1,
                                   f32::kMostFootprintPlaces);
-    const double texels = std::max({footprint.width, footprint.length / places, 1.0});
+    const double texels = std::max({footprint.shortAxis, footprint.longAxis / places, 1.0});
     const double level = std::min(std::log2(texels), double(levels.size() - 1));
     glm::dvec4 sum(0);
     for (int place = 0; place < places; ++place)
@@ -107,13 +107,13 @@ TEST(ImageFilter, IsItsDefinition) {
         const ImageWraps wraps{seed % 3, seed / 3 % 3};
         const glm::dvec2 at(number(-3, 3), number(-3, 3));
         f64::ImageFootprint footprint;
-        footprint.width = std::exp2(number(-3, 6));
-        footprint.length = footprint.width * std::exp2(number(0, 4));
+        footprint.shortAxis = std::exp2(number(-3, 6));
+        footprint.longAxis = footprint.shortAxis * std::exp2(number(0, 4));
         const double angle = number(0, 6.28);
-        footprint.along = glm::dvec2(std::cos(angle) / 37, std::sin(angle) / 21) * footprint.length;
+        footprint.along = glm::dvec2(std::cos(angle) / 37, std::sin(angle) / 21) * footprint.longAxis;
         f32::ImageFootprint single;
-        single.width = float(footprint.width);
-        single.length = float(footprint.length);
+        single.shortAxis = float(footprint.shortAxis);
+        single.longAxis = float(footprint.longAxis);
         single.along = glm::vec2(footprint.along);
         const glm::vec4 found =
             filteredColour(set, set.images()[0], wraps, glm::vec2(at), placesOf(set.images()[0], single));
@@ -134,8 +134,8 @@ TEST(ImageFilter, AnyNumbersAreRead) {
                     for (uint32_t wrap = 0; wrap < 3; ++wrap) {
                         f32::ImageFootprint footprint;
                         footprint.along = {along, u};
-                        footprint.length = std::abs(v);
-                        footprint.width = width;
+                        footprint.longAxis = std::abs(v);
+                        footprint.shortAxis = width;
                         const glm::vec4 found =
                             filteredColour(set, image, {wrap, (wrap + 1) % 3}, {u, v}, placesOf(image, footprint));
                         for (int c = 0; c < 4; ++c) ASSERT_TRUE(found[c] >= 0 && found[c] <= 1.0001f) << found[c];
@@ -154,17 +154,17 @@ TEST(ImageFilter, FootprintsAreThoseOfThePixel) {
         return f64::imageFootprint(slope, V(0, 0, 1), glm::normalize(direction), pixel, size);
     };
     const auto above = from(V(0, 0, -1), 0.5);
-    EXPECT_NEAR(above.length, 20, 1e-9);
-    EXPECT_NEAR(above.width, 5, 1e-9);
+    EXPECT_NEAR(above.longAxis, 20, 1e-9);
+    EXPECT_NEAR(above.shortAxis, 5, 1e-9);
     EXPECT_NEAR(std::abs(above.along.y), 0.1, 1e-9) << "20 of 200 texels along v";
     EXPECT_NEAR(above.along.x, 0, 1e-9);
     // From the side, along x, it is stretched by the slant.
     const auto slant = from(V(std::sqrt(3.0), 0, -1), 0.5);
-    EXPECT_NEAR(slant.length, 20, 1e-9);
-    EXPECT_NEAR(slant.width, 10, 1e-9);
+    EXPECT_NEAR(slant.longAxis, 20, 1e-9);
+    EXPECT_NEAR(slant.shortAxis, 10, 1e-9);
     const auto steep = from(V(0, std::sqrt(3.0), -1), 0.5);
-    EXPECT_NEAR(steep.length, 40, 1e-9);
-    EXPECT_NEAR(steep.width, 5, 1e-9);
+    EXPECT_NEAR(steep.longAxis, 40, 1e-9);
+    EXPECT_NEAR(steep.shortAxis, 5, 1e-9);
     EXPECT_EQ(f64::footprintPlaces(steep), 8);
     EXPECT_NEAR(f64::footprintLevel(steep, 8), std::log2(5.0), 1e-9);
     EXPECT_EQ(f64::footprintLevel(from(V(0, 0, -1), 0.001), 1), 0) << "no level is finer than the image";

@@ -1,0 +1,16 @@
+// The images of a file on the device: the words that shaders/images.glsl reads.
+#pragma once
+
+#include "octree/image/image_set.h"
+#include "render/vulkan/device.h"
+
+namespace vcp {
+
+/// Returns the most bytes of images that shaders of a device can address.
+uint64_t mostImageBytes(const Device& device);
+
+/// Copies images to the device, and waits for it. Precondition: they take no more than mostImageBytes, or they are
+/// single texels. Errors: Device.
+Result<Buffer> uploadImages(Device& device, const ImageSet& images);
+
+}  // namespace vcp
