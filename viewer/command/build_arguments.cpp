@@ -91,10 +91,9 @@ void addColourChoice(CLI::App& app, BuildOptions& options) {
 }
 
 void addImages(CLI::App& app, BuildOptions& options) {
-    app.add_flag(
-        "--images", options.keepImages,
-        "Keep the images of materials, too, as sharp as they are, with their place on the triangles; so far only "
-        "`--device host` draws from them");
+    app.add_flag("--images", options.keepImages,
+                 "Keep the images of materials, too, as sharp as they are, with their place on the triangles; browsers "
+                 "do not draw from them yet");
 }
 
 void addVertexNormals(CLI::App& app, BuildOptions& options) {
