@@ -42,7 +42,8 @@ INLINE TextureSlope textureSlope(Real3 a, Real3 b, Real3 c, Real2 toB, Real2 toC
     return slope;
 }
 
-// A footprint in an image. `along`: its length as a step of coordinates; `longAxis`, `shortAxis`: of the ellipse, texels.
+// A footprint in an image. `along`: its length as a step of coordinates; `longAxis`, `shortAxis`: those of the ellipse,
+// texels.
 struct ImageFootprint {
     Real2 along;
     Real longAxis;
