@@ -98,7 +98,8 @@ void addBilinear(glm::vec4& sum, const ImageSet& set, const ImageSet::Level& lev
 
 ImagePlaces placesOf(const ImageSet::Image& image, const f32::ImageFootprint& footprint) {
     // Where coordinates change too fast for numbers, as on slivers, an image shows its mean.
-    const float size = footprint.longAxis + footprint.shortAxis + std::abs(footprint.along.x) + std::abs(footprint.along.y);
+    const float size =
+        footprint.longAxis + footprint.shortAxis + std::abs(footprint.along.x) + std::abs(footprint.along.y);
     if (!(size <= std::numeric_limits<float>::max())) return {.finer = image.levels.size() - 1};
     ImagePlaces places{.count = f32::footprintPlaces(footprint), .along = footprint.along};
     const float last = float(image.levels.size() - 1);
