@@ -38,11 +38,7 @@ Result<void> HostRenderer::open(std::vector<PlacedDataset> datasets, std::span<c
     const auto openAll = [&]() -> Result<void> {
         for (const PlacedDataset& placed : datasets) VCP_TRY(checkHostDraws(*placed.dataset, placed.source->name()));
         RendererOptions left = options_;
-        DatasetImages images;
-        if (options_.colour) {
-            VCP_TRY_ASSIGN(images, readImages(datasets, options_.ramBytes / 2));
-        }
-        pageRam_ = left.ramBytes -= std::min(bytesOf(images), left.ramBytes / 2);
+        VCP_TRY_ASSIGN(auto images, readImages(datasets, options_.colour, options_.ramBytes / 2));
         VCP_TRY_ASSIGN(left.budgetBytes, budgetOfPages(options_.budgetBytes, bytesOf(prepared_)));
         VCP_TRY_ASSIGN(datasets_, openResidencies(hostPageMemory(), left, std::move(datasets), std::move(images)));
         return {};
@@ -75,7 +71,8 @@ Result<void> HostRenderer::setSurfaces(std::span<const MesoSurface> surfaces) {
     if (datasets_.empty() || bytesOf(prepared_) == before) return {};
     const auto fit = [&]() -> Result<void> {
         VCP_TRY_ASSIGN(const auto pageBytes, budgetOfPages(options_.budgetBytes, bytesOf(prepared_)));
-        return sceneOf(datasets_)->setBudgets(hostPageMemory(), pageBytes, pageRam_);
+        return sceneOf(datasets_)->setBudgets(hostPageMemory(), pageBytes,
+                                              ramOfPages(options_.ramBytes, imageBytes(datasets_)));
     };
     auto fits = fit();
     if (!fits) VCP_TRY(takeSurfaces({}));

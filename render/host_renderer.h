@@ -43,7 +43,6 @@ private:
     const RendererOptions options_;
     const DeviceInfo info_;
     std::vector<PlacedResidency> datasets_;
-    uint64_t pageRam_ = 0;  // what images leave of the options' RAM
     std::vector<MesoSurface> surfaces_;
     std::vector<PreparedSurface> prepared_;  // of surfaces_
     bool surfacesChanged_ = false;           // since the last update

@@ -66,11 +66,13 @@ uint64_t budgetOfImages(uint64_t budgetBytes) {
     return budgetBytes > kLeastBudget ? std::min(budgetBytes / 2, budgetBytes - kLeastBudget) : 0;
 }
 
-Result<DatasetImages> readImages(std::span<const PlacedDataset> datasets, uint64_t mostBytes) {
+uint64_t ramOfPages(uint64_t ramBytes, uint64_t imageBytes) { return ramBytes - std::min(imageBytes, ramBytes / 2); }
+
+Result<DatasetImages> readImages(std::span<const PlacedDataset> datasets, bool withColour, uint64_t mostBytes) {
     DatasetImages images(datasets.size());
     uint64_t left = mostBytes;
     for (size_t i = 0; i < datasets.size(); ++i) {
-        if (!datasets[i].dataset->hasImages()) continue;
+        if (!withColour || !datasets[i].dataset->hasImages()) continue;
         VCP_TRY_ASSIGN(images[i], datasets[i].source->readImages(left));
         left -= images[i] ? std::min(images[i]->bytes(), left) : 0;
     }
@@ -80,6 +82,12 @@ Result<DatasetImages> readImages(std::span<const PlacedDataset> datasets, uint64
 uint64_t bytesOf(const DatasetImages& images) {
     uint64_t bytes = 0;
     for (const auto& each : images) bytes += each ? each->bytes() : 0;
+    return bytes;
+}
+
+uint64_t imageBytes(std::span<const PlacedResidency> datasets) {
+    uint64_t bytes = 0;
+    for (const PlacedResidency& placed : datasets) bytes += placed.images ? placed.images->bytes() : 0;
     return bytes;
 }
 
@@ -94,18 +102,18 @@ Result<std::vector<PlacedResidency>> openResidencies(const PageMemorySource& mem
     all.order = options.order;
     all.hiddenToo = options.hiddenToo;
     all.loader.withColour = options.colour;
-    all.loader.heldBytes = options.ramBytes;
+    all.loader.heldBytes = ramOfPages(options.ramBytes, bytesOf(images));
     all.loader.threads = loaderThreads(placed, options.loaderThreads);
     std::vector<SceneSource::Part> parts;
     for (PlacedDataset& one : placed) {
         const uint64_t needed = placed.size() > 1 && !one.dataset->pages.empty()
                                     ? one.source->bytesToRead(0, options.colour && one.dataset->hasColour())
                                     : 0;
-        if (needed > options.ramBytes)
+        if (needed > all.loader.heldBytes)
             return Error{.code = ErrorCode::Limit,
                          .message = fmt::format("reading the coarsest page takes {} bytes, more than the {} of "
                                                 "memory for pages on their way: allow more",
-                                                needed, options.ramBytes),
+                                                needed, all.loader.heldBytes),
                          .file = one.source->name()};
         parts.push_back({std::move(one.dataset), std::move(one.source)});
     }

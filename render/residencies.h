@@ -22,11 +22,12 @@ struct PlacedResidency {
 /// Images of datasets, one for each, null where it has none.
 using DatasetImages = std::vector<std::shared_ptr<const ImageSet>>;
 
-/// Reads the images of datasets. Where all together take more than `mostBytes`, the finest levels are left out; the
-/// coarsest level of each is always there. Errors: as of PageSource::readImages.
-Result<DatasetImages> readImages(std::span<const PlacedDataset> datasets, uint64_t mostBytes);
+/// Reads the images of datasets; without colour, none. Where all together take more than `mostBytes`, the finest levels
+/// are left out; the coarsest level of each is always there. Errors: as of PageSource::readImages.
+Result<DatasetImages> readImages(std::span<const PlacedDataset> datasets, bool withColour, uint64_t mostBytes);
 /// Bytes of all images.
 uint64_t bytesOf(const DatasetImages& images);
+uint64_t imageBytes(std::span<const PlacedResidency> datasets);
 
 /// Refuses budgets that are too small for any page. Errors: Usage.
 Result<void> checkBudget(uint64_t budgetBytes);
@@ -35,9 +36,11 @@ Result<void> checkBudget(uint64_t budgetBytes);
 Result<uint64_t> budgetOfPages(uint64_t budgetBytes, uint64_t otherBytes);
 /// Returns the most bytes that images may take: half of a budget, as long as pages keep the least one.
 uint64_t budgetOfImages(uint64_t budgetBytes);
+/// Returns what images leave of the memory for pages on their way: at least half.
+uint64_t ramOfPages(uint64_t ramBytes, uint64_t imageBytes);
 
 /// Makes the datasets' residencies, whose one pool comes from `memory`, within options.budgetBytes and ramBytes.
-/// `images`: none, or of each dataset, beside these budgets. Errors: as of SceneResidency::create.
+/// `images`: none, or of each dataset; they count as RAM. Errors: as of SceneResidency::create.
 Result<std::vector<PlacedResidency>> openResidencies(const PageMemorySource& memory, const RendererOptions& options,
                                                      std::vector<PlacedDataset> datasets, DatasetImages images = {});
 

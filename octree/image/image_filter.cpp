@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 
 namespace vcp {
 
@@ -66,12 +65,6 @@ glm::ivec2 pairOf(int at, int size, uint32_t wrap) {
     return {f32::wrappedTexel(at, size, wrap), f32::wrappedTexel(at + 1, size, wrap)};
 }
 
-/// A place in a row of texels for which wrappedTexel is exact; those beyond, and what is no number, are taken for 0.
-float boundedPlace(float at) {
-    constexpr float kFar = 1 << 23;
-    return at >= -kFar && at <= kFar ? at : 0.0f;
-}
-
 /// Returns the largest whole number that is not above `x`; |x| < 2^31. (std::floor is a call on old processors.)
 int wholeBelow(float x) {
     const int whole = int(x);
@@ -82,7 +75,7 @@ int wholeBelow(float x) {
 void addBilinear(glm::vec4& sum, const ImageSet& set, const ImageSet::Level& level, ImageWraps wraps, glm::vec2 at,
                  float weight) {
     const int width = int(level.width), height = int(level.height);
-    const float x = boundedPlace(at.x * float(width) - 0.5f), y = boundedPlace(at.y * float(height) - 0.5f);
+    const float x = f32::boundedPlace(at.x * float(width) - 0.5f), y = f32::boundedPlace(at.y * float(height) - 0.5f);
     const int column = wholeBelow(x), row = wholeBelow(y);
     const float fx = x - float(column), fy = y - float(row);
     const glm::ivec2 columns = pairOf(column, width, wraps.u), rows = pairOf(row, height, wraps.v);
@@ -96,28 +89,15 @@ void addBilinear(glm::vec4& sum, const ImageSet& set, const ImageSet::Level& lev
 
 }  // namespace
 
-ImagePlaces placesOf(const ImageSet::Image& image, const f32::ImageFootprint& footprint) {
-    // Where coordinates change too fast for numbers, as on slivers, an image shows its mean.
-    const float size =
-        footprint.longAxis + footprint.shortAxis + std::abs(footprint.along.x) + std::abs(footprint.along.y);
-    if (!(size <= std::numeric_limits<float>::max())) return {.finer = image.levels.size() - 1};
-    ImagePlaces places{.count = f32::footprintPlaces(footprint), .along = footprint.along};
-    const float last = float(image.levels.size() - 1);
-    const float level = std::clamp(f32::footprintLevel(footprint, places.count) - float(image.finest), 0.0f, last);
-    places.finer = size_t(level);
-    places.coarser = level - float(places.finer);
-    return places;
-}
-
 glm::vec4 filteredColour(const ImageSet& set, const ImageSet::Image& image, ImageWraps wraps, glm::vec2 at,
                          const ImagePlaces& places) {
     const float part = 1 / float(places.count);
     glm::vec4 sum(0);
     for (int i = 0; i < places.count; ++i) {
         const glm::vec2 place = at + ((float(i) + 0.5f) * part - 0.5f) * places.along;
-        addBilinear(sum, set, image.levels[places.finer], wraps, place, (1 - places.coarser) * part);
+        addBilinear(sum, set, image.levels[size_t(places.finer)], wraps, place, (1 - places.coarser) * part);
         if (places.coarser > 0)
-            addBilinear(sum, set, image.levels[places.finer + 1], wraps, place, places.coarser * part);
+            addBilinear(sum, set, image.levels[size_t(places.finer) + 1], wraps, place, places.coarser * part);
     }
     if (!(sum.w > 0)) return glm::vec4(0);
     const ColourTables& tables = ColourTables::get();

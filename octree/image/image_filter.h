@@ -15,14 +15,10 @@ struct ImageWraps {
     uint32_t u = f32::kWrapRepeat, v = f32::kWrapRepeat;
 };
 
-/// A footprint as an image is read with it: at so many places along it, each from two levels.
-struct ImagePlaces {
-    int count = 1;
-    glm::vec2 along{0};  ///< the footprint's length as a step of coordinates
-    size_t finer = 0;    ///< number of the finer level among those in memory
-    float coarser = 0;   ///< share of the level after it
-};
-ImagePlaces placesOf(const ImageSet::Image& image, const f32::ImageFootprint& footprint);
+using f32::ImagePlaces;
+inline ImagePlaces placesOf(const ImageSet::Image& image, const f32::ImageFootprint& footprint) {
+    return f32::imagePlaces(footprint, int(image.finest), int(image.levels.size()));
+}
 
 /// Returns the mean over a footprint about `at`, in coordinates of the image ((0, 0): its upper left corner): encoded
 /// for the screen and with alpha, 0 to 1. What is transparent lends no colour; where all is, it is 0. Any

@@ -95,3 +95,37 @@ INLINE int footprintPlaces(ImageFootprint footprint) {
 INLINE Real footprintLevel(ImageFootprint footprint, int places) {
     return log2(max(max(footprint.shortAxis, footprint.longAxis / Real(places)), Real(1.0)));
 }
+
+// How an image is read with a footprint: at so many places along it, each from two levels.
+struct ImagePlaces {
+    int count;
+    Real2 along;   // the footprint's length as a step of coordinates
+    int finer;     // number of the finer level among those in memory
+    Real coarser;  // share of the level after it
+};
+
+// Footprints larger than this are taken for no numbers.
+const float kMostFootprint = 3e38f;
+
+// `finest`: number of the finest level in memory; `levels`: how many are there, from that one on.
+INLINE ImagePlaces imagePlaces(ImageFootprint footprint, int finest, int levels) {
+    ImagePlaces places;
+    places.count = 1;
+    places.along = Real2(0.0, 0.0);
+    places.finer = levels - 1;
+    places.coarser = Real(0.0);
+    // Where coordinates change too fast for numbers, as on slivers, an image shows its mean.
+    Real extent = footprint.longAxis + footprint.shortAxis + abs(footprint.along.x) + abs(footprint.along.y);
+    if (extent <= Real(kMostFootprint)) {
+        places.count = footprintPlaces(footprint);
+        places.along = footprint.along;
+        Real level = clamp(footprintLevel(footprint, places.count) - Real(finest), Real(0.0), Real(levels - 1));
+        places.finer = int(level);
+        places.coarser = level - Real(places.finer);
+    }
+    return places;
+}
+
+// A place in a row of texels for which wrappedTexel is exact; those beyond, and what is no number, are taken for 0.
+const float kFarTexel = 8388608.0f;
+INLINE Real boundedPlace(Real at) { return at >= -Real(kFarTexel) && at <= Real(kFarTexel) ? at : Real(0.0); }

@@ -9,8 +9,7 @@ namespace vcp {
 /// Returns the most bytes of images that shaders of a device can address.
 uint64_t mostImageBytes(const Device& device);
 
-/// Copies images to the device, and waits for it. Precondition: they take no more than mostImageBytes, or they are
-/// single texels. Errors: Device.
+/// Copies images to the device, and waits for it. Errors: Device; Limit, where shaders could not address them.
 Result<Buffer> uploadImages(Device& device, const ImageSet& images);
 
 }  // namespace vcp

@@ -1,7 +1,5 @@
 #include "render/passes/meso_resources.h"
 
-#include <cstring>
-
 #include <fmt/format.h>
 
 #include "render/vulkan/check.h"
@@ -44,31 +42,13 @@ MesoResources::~MesoResources() {
     vkDestroyDescriptorSetLayout(device_.handle(), setLayout_, nullptr);
 }
 
-Result<Buffer> MesoResources::upload(std::span<const std::byte> bytes) {
-    auto buffer = device_.createBuffer(
-        bytes.size(), VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT, MemoryUse::Local);
-    if (!buffer) return buffer;
-    if (std::byte* mapped = buffer->mapped()) {
-        std::memcpy(mapped, bytes.data(), bytes.size());
-        return buffer;
-    }
-    auto staging = device_.createBuffer(bytes.size(), VK_BUFFER_USAGE_TRANSFER_SRC_BIT, MemoryUse::Upload);
-    if (!staging) return staging;
-    std::memcpy(staging->mapped(), bytes.data(), bytes.size());
-    VCP_TRY(device_.submitAndWait([&](VkCommandBuffer commands) {
-        const VkBufferCopy region{0, 0, bytes.size()};
-        vkCmdCopyBuffer(commands, staging->handle(), buffer->handle(), 1, &region);
-    }));
-    return buffer;
-}
-
 Result<MesoTexels> MesoResources::words(std::span<const uint32_t> words) {
     if (words.size() > device_.limits().maxTexelBufferElements)
         return Error{.code = ErrorCode::Limit,
                      .message = fmt::format("a mesostructure of {} words; this device reads {} at most", words.size(),
                                             device_.limits().maxTexelBufferElements)};
     MesoTexels made;
-    VCP_TRY_ASSIGN(auto buffer, upload(std::as_bytes(words)));
+    VCP_TRY_ASSIGN(auto buffer, device_.createFilled({std::as_bytes(words)}, VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT));
     made.buffer = std::move(buffer);
     VCP_TRY_ASSIGN(made.view, device_.createTexelView(made.buffer, VK_FORMAT_R32_UINT, words.size_bytes()));
     VCP_TRY_ASSIGN(made.quads, device_.createTexelView(made.buffer, VK_FORMAT_R32G32B32A32_UINT, words.size_bytes()));
@@ -83,7 +63,7 @@ Result<MesoTexels> MesoResources::texels(std::span<const std::byte> bytes, uint3
                      .message = fmt::format("{} texels of {}; this device reads {} at most", count, what,
                                             device_.limits().maxTexelBufferElements)};
     MesoTexels made;
-    VCP_TRY_ASSIGN(auto buffer, upload(bytes));
+    VCP_TRY_ASSIGN(auto buffer, device_.createFilled({bytes}, VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT));
     made.buffer = std::move(buffer);
     VCP_TRY_ASSIGN(made.view, device_.createTexelView(made.buffer, format, bytes.size()));
     return made;

@@ -91,7 +91,6 @@ public:
 private:
     explicit MesoResources(Device& device) : device_(device) {}
     Result<void> createLayout();
-    Result<Buffer> upload(std::span<const std::byte> bytes);
     Result<MesoTexels> texels(std::span<const std::byte> bytes, uint32_t texelBytes, VkFormat format, const char* what);
 
     Device& device_;

@@ -1,5 +1,5 @@
 // What the images of a file show on triangles: octree/imaged_triangle.h and octree/image/image_filter.h as shaders read
-// them. The words of the images (DeviceImages):
+// them. The words of the images (render/passes/image_words.h):
 //
 //   4 words            the number of materials; 0
 //   4 words a material where its image begins; RGBA8 that multiplies what the image shows; how it goes on beyond its
@@ -70,9 +70,6 @@ vec4 weightedTexel(uint word, float weight) {
     return vec4(lightOfStored(texel.x), lightOfStored(texel.y), lightOfStored(texel.z), 1.0) * weight;
 }
 
-// A place in a row of texels for which wrappedTexel is exact; those beyond, and what is no number, are taken for 0.
-float boundedPlace(float at) { return at >= -8388608.0 && at <= 8388608.0 ? at : 0.0; }
-
 // Returns what a level shows at a point, between four texels, times a weight.
 vec4 bilinearLight(uvec4 level, ImagedTriangle t, vec2 at, float weight) {
     ivec2 size = ivec2(level.xy);
@@ -92,28 +89,15 @@ vec4 bilinearLight(uvec4 level, ImagedTriangle t, vec2 at, float weight) {
 vec4 imageColour(ImagedTriangle t, vec2 at, TextureSlope slope, vec3 n, vec3 direction, float pixelEdge) {
     uvec4 image = imageRecord(t.image);
     ImageFootprint footprint = imageFootprint(slope, n, direction, pixelEdge, vec2(image.xy));
-    float last = float(image.w - 1u);
-    int count = 1;
-    float level = last;
-    // Where coordinates change too fast for numbers, as on slivers, an image shows its mean.
-    float extent = footprint.longAxis + footprint.shortAxis + abs(footprint.along.x) + abs(footprint.along.y);
-    bool isFinite = extent <= 3e38;
-    if (isFinite) {
-        count = footprintPlaces(footprint);
-        level = clamp(footprintLevel(footprint, count) - float(image.z), 0.0, last);
-    } else {
-        footprint.along = vec2(0.0);
-    }
-    uint finer = uint(level);
-    float coarser = level - float(finer);
-    uvec4 first = imageRecord(t.image + 4u + 4u * finer);
-    uvec4 second = imageRecord(t.image + 4u + 4u * min(finer + 1u, image.w - 1u));
-    float part = 1.0 / float(count);
+    ImagePlaces places = imagePlaces(footprint, int(image.z), int(image.w));
+    uint finer = t.image + 4u + 4u * uint(places.finer);
+    uvec4 first = imageRecord(finer), second = imageRecord(places.coarser > 0.0 ? finer + 4u : finer);
+    float part = 1.0 / float(places.count);
     vec4 sum = vec4(0.0);
-    DONT_UNROLL for (int i = 0; i < count; i++) {
-        vec2 place = at + ((float(i) + 0.5) * part - 0.5) * footprint.along;
-        sum += bilinearLight(first, t, place, (1.0 - coarser) * part);
-        if (coarser > 0.0) sum += bilinearLight(second, t, place, coarser * part);
+    DONT_UNROLL for (int i = 0; i < places.count; i++) {
+        vec2 place = at + ((float(i) + 0.5) * part - 0.5) * places.along;
+        sum += bilinearLight(first, t, place, (1.0 - places.coarser) * part);
+        if (places.coarser > 0.0) sum += bilinearLight(second, t, place, places.coarser * part);
     }
     // What is transparent lends no colour.
     if (!(sum.w > 0.0)) return vec4(0.0);

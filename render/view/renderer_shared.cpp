@@ -44,12 +44,6 @@ Result<void> Renderer::Shared::uploadSurfaces() {
     return done;
 }
 
-uint64_t Renderer::Shared::imageBytes() const {
-    uint64_t bytes = 0;
-    for (const PlacedResidency& placed : datasets) bytes += placed.images ? placed.images->bytes() : 0;
-    return bytes;
-}
-
 Result<void> Renderer::Shared::needImages(size_t dataset) {
     if (!datasets[dataset].images) return {};
     images.resize(datasets.size());
@@ -62,13 +56,9 @@ Result<void> Renderer::Shared::addDatasets(std::vector<PlacedDataset> placed) {
     if (placed.empty()) return showPool();
     RendererOptions left = options;
     VCP_TRY_ASSIGN(const auto beside, pageBudget(options.budgetBytes));
-    DatasetImages read;
-    if (options.colour) {
-        const uint64_t most = std::min({budgetOfImages(beside), options.ramBytes / 2, mostImageBytes(*device)});
-        VCP_TRY_ASSIGN(read, readImages(placed, most));
-    }
+    const uint64_t most = std::min({budgetOfImages(beside), options.ramBytes / 2, mostImageBytes(*device)});
+    VCP_TRY_ASSIGN(auto read, readImages(placed, options.colour, most));
     VCP_TRY_ASSIGN(left.budgetBytes, budgetOfPages(beside, bytesOf(read)));
-    left.ramBytes -= std::min(bytesOf(read), left.ramBytes / 2);
     VCP_TRY_ASSIGN(auto opened, openResidencies(poolsOf(*device, access), left, std::move(placed), std::move(read)));
     std::move(opened.begin(), opened.end(), std::back_inserter(datasets));
     return showPool();

@@ -69,17 +69,15 @@ struct Renderer::Shared {
     }
     /// Bytes of the surfaces, which the budget pays for before pages.
     [[nodiscard]] uint64_t surfaceBytes() const { return meso && meso->pass ? meso->pass->assetBytes() : 0; }
-    /// Bytes of the datasets' images.
-    [[nodiscard]] uint64_t imageBytes() const;
     /// Copies the images of a dataset to the device, unless they are there or there are none; waits for it. Not while
-    /// commands are recorded. Errors: Device.
+    /// commands are recorded. Errors: as of uploadImages.
     Result<void> needImages(size_t dataset);
     /// Returns what the surfaces and the images leave of a budget for pages. Errors: Limit, where that is too little.
     Result<uint64_t> pageBudget(uint64_t budgetBytes) const {
-        return budgetOfPages(budgetBytes, surfaceBytes() + imageBytes());
+        return budgetOfPages(budgetBytes, surfaceBytes() + imageBytes(datasets));
     }
     /// Returns what the images leave of the memory for pages on their way.
-    [[nodiscard]] uint64_t pageRam(uint64_t ramBytes) const { return ramBytes - std::min(imageBytes(), ramBytes / 2); }
+    [[nodiscard]] uint64_t pageRam(uint64_t ramBytes) const { return ramOfPages(ramBytes, imageBytes(datasets)); }
     /// Opens datasets beside those that are open, and shows all. After an error none is added. Errors: as of
     /// Renderer::open.
     Result<void> addDatasets(std::vector<PlacedDataset> placed);

@@ -1,16 +1,13 @@
 // Images on the device: pictures by the shaders against those by the host, whose filter is held against its definition.
 #include <gtest/gtest.h>
 
-#include "builder/build.h"
+#include "tests/support/built_walls.h"
 #include "tests/support/host_comparison.h"
 #include "tests/support/renderer_fixture.h"
 #include "tests/support/test_folder.h"
-#include "tests/support/textured_walls.h"
 
 namespace vcp {
 namespace {
-
-using test::TexturedWalls;
 
 /// Walls with images that have details of every size.
 class ImageTest : public test::RendererFixture, public testing::WithParamInterface<PageAccess> {
@@ -19,19 +16,8 @@ protected:
         const auto texel = [](uint32_t x, uint32_t y) {
             return (x * 5 + y * 3) % 256 | ((x / 8 + y / 8) % 2 == 0 ? 200u : 30u) << 8 | (x * y % 256) << 16;
         };
-        TexturedWalls::write(folder_.path(), texel, texel);
-        BuildOptions options;
-        options.inputs = {folder_ / "walls.obj"};
-        options.output = folder_ / "walls.vcp";
-        options.cell = 0.2;
-        options.threads = 2;
-        options.keepImages = true;
-        const auto report = buildOctree(options);
-        ASSERT_TRUE(report.ok()) << report.error().line();
-        const auto reader = openFile(options.output);
-        ASSERT_TRUE(reader);
-        dataset_ = std::make_shared<const Dataset>(*readDataset(**reader));
-        source_ = std::make_shared<FilePageSource>(*reader, dataset_);
+        walls_ = test::builtWalls(folder_.path(), texel, texel);
+        ASSERT_TRUE(walls_.dataset);
     }
 
     /// From afar, from near, along the floor, so near that a texel is many pixels wide, and without perspective.
@@ -62,13 +48,6 @@ protected:
         return request;
     }
 
-    [[nodiscard]] std::vector<PlacedDataset> placed() const {
-        std::vector<PlacedDataset> one(1);
-        one[0].dataset = dataset_;
-        one[0].source = source_;
-        return one;
-    }
-
     /// Returns the bytes of a settled picture; none where the device was lost as it was read.
     static std::vector<uint8_t> shown(Renderer& renderer, const FrameRequest& request) {
         EXPECT_TRUE(renderer.drawSettled(request));
@@ -94,8 +73,7 @@ protected:
     }
 
     TestFolder folder_{"vcp_image_test"};
-    std::shared_ptr<const Dataset> dataset_;
-    std::shared_ptr<const PageSource> source_;
+    PlacedDataset walls_;
 };
 
 TEST_P(ImageTest, PicturesAreThoseOfTheHost) {
@@ -104,8 +82,8 @@ TEST_P(ImageTest, PicturesAreThoseOfTheHost) {
     start(options);
     const auto host = HostRenderer::create({});
     ASSERT_TRUE(host);
-    ASSERT_TRUE(renderer_->open(placed()));
-    ASSERT_TRUE((*host)->open(placed(), {}));
+    ASSERT_TRUE(renderer_->open({walls_}));
+    ASSERT_TRUE((*host)->open({walls_}, {}));
     for (const Camera& camera : cameras()) {
         SCOPED_TRACE(glm::length(camera.eye));
         const auto [far, mean] = apart(*renderer_, **host, unlit(camera));
@@ -123,8 +101,8 @@ TEST_P(ImageTest, AreNotOfOtherColours) {
     without.colour = false;
     const auto host = HostRenderer::create(without);
     ASSERT_TRUE(host);
-    ASSERT_TRUE(renderer_->open(placed()));
-    ASSERT_TRUE((*host)->open(placed(), {}));
+    ASSERT_TRUE(renderer_->open({walls_}));
+    ASSERT_TRUE((*host)->open({walls_}, {}));
     EXPECT_GT(apart(*renderer_, **host, unlit(cameras()[2])).second, 20);
 }
 
@@ -135,8 +113,8 @@ TEST_P(ImageTest, CoarserOnesDoWhereTheBudgetIsSmall) {
     start(options);
     const auto host = HostRenderer::create({});
     ASSERT_TRUE(host);
-    ASSERT_TRUE(renderer_->open(placed()));
-    ASSERT_TRUE((*host)->open(placed(), {}));
+    ASSERT_TRUE(renderer_->open({walls_}));
+    ASSERT_TRUE((*host)->open({walls_}, {}));
     EXPECT_LT(apart(*renderer_, **host, unlit(cameras()[1])).second, 0.8) << "from afar";
     const double near = apart(*renderer_, **host, unlit(cameras()[2])).second;
     EXPECT_GT(near, 3) << "20,000 bytes do not hold the finest levels";
@@ -147,13 +125,13 @@ TEST_P(ImageTest, ALostDeviceOfMemoryOfItsOwnShowsThemAgain) {
     RendererOptions options;
     options.access = GetParam();
     start(options);
-    ASSERT_TRUE(renderer_->open(placed()));
+    ASSERT_TRUE(renderer_->open({walls_}));
     const FrameRequest request = unlit(cameras()[2]);
     const std::vector<uint8_t> expected = shown(*renderer_, request);
     options.faults.separateMemory = true;
     options.faults.lostAtSubmission = 6;
     start(options);
-    ASSERT_TRUE(renderer_->open(placed()));
+    ASSERT_TRUE(renderer_->open({walls_}));
     uint32_t losses = 0;
     for (int i = 0; i < 20 && losses == 0; ++i) {
         static_cast<void>(shown(*renderer_, request));
@@ -171,8 +149,8 @@ TEST_P(ImageTest, TheProcessorShowsThemForASoftwareDevice) {
     if (!renderer_->device().software) GTEST_SKIP() << "of software devices";
     const auto host = HostRenderer::create({});
     ASSERT_TRUE(host);
-    ASSERT_TRUE(renderer_->open(placed()));
-    ASSERT_TRUE((*host)->open(placed(), {}));
+    ASSERT_TRUE(renderer_->open({walls_}));
+    ASSERT_TRUE((*host)->open({walls_}, {}));
     const FrameRequest request = unlit(cameras()[2]);
     EXPECT_EQ(test::drawnBy(*renderer_, request).picture.rgba, test::drawnBy(**host, request).picture.rgba);
 }

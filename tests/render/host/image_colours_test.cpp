@@ -6,14 +6,12 @@
 
 #include <gtest/gtest.h>
 
-#include "builder/build.h"
 #include "builder/stream/colour_encoding.h"
 #include "octree/image/image_filter.h"
 #include "render/host_renderer.h"
-#include "streaming/page_source.h"
+#include "tests/support/built_walls.h"
 #include "tests/support/image_file.h"
 #include "tests/support/test_folder.h"
-#include "tests/support/textured_walls.h"
 
 namespace vcp {
 namespace {
@@ -174,27 +172,15 @@ TEST(ImageFilter, FootprintsAreThoseOfThePixel) {
 class ImagePictures : public ::testing::Test {
 protected:
     void build(const test::TexelAt& floor) {
-        TexturedWalls::write(folder_.path(), floor, [](uint32_t, uint32_t) { return 0x808080u; });
-        BuildOptions options;
-        options.inputs = {folder_ / "walls.obj"};
-        options.output = folder_ / "walls.vcp";
-        options.cell = 0.2;
-        options.threads = 2;
-        options.overwrite = true;
-        options.keepImages = true;
-        const auto report = buildOctree(options);
-        ASSERT_TRUE(report.ok()) << report.error().line();
+        const PlacedDataset walls =
+            test::builtWalls(folder_.path(), floor, [](uint32_t, uint32_t) { return 0x808080u; });
+        ASSERT_TRUE(walls.dataset);
         RendererOptions shown;
         shown.budgetBytes = uint64_t{64} << 20;
         auto renderer = HostRenderer::create(shown);
         ASSERT_TRUE(renderer.ok());
         renderer_ = *std::move(renderer);
-        auto reader = openFile(folder_ / "walls.vcp");
-        auto dataset = std::make_shared<const Dataset>(*readDataset(**reader));
-        PlacedDataset placed;
-        placed.dataset = dataset;
-        placed.source = std::make_shared<FilePageSource>(*reader, dataset);
-        const auto opened = renderer_->open({placed}, {});
+        const auto opened = renderer_->open({walls}, {});
         ASSERT_TRUE(opened.ok()) << opened.error().line();
     }
 
