@@ -11,9 +11,8 @@ namespace vcp::meso {
 
 namespace {
 
-using glm::dvec2, glm::dvec3;
+using glm::dvec2, glm::dvec3, std::numbers::pi;
 
-constexpr double kPi = std::numbers::pi;
 constexpr int kShadowRays = 2;
 constexpr double kLift = 1e-4;  // by which shadow rays start above a hit, tile units
 using Harmonics = std::array<double, 9>;
@@ -32,14 +31,14 @@ Harmonics harmonicsOf(dvec3 d) {
 }
 
 /// Coefficient of a clamped cosine, by band.
-double cosineBand(int i) { return i == 0 ? kPi : i < 4 ? 2 * kPi / 3 : kPi / 4; }
+double cosineBand(int i) { return i == 0 ? pi : i < 4 ? 2 * pi / 3 : pi / 4; }
 
 /// The unit vector of a view.
 dvec3 viewOf(uint32_t i, uint32_t j) {
     const double u = 2.0 * i / (Appearance::kViews - 1) - 1, v = 2.0 * j / (Appearance::kViews - 1) - 1,
                  x = (u + v) / 2, y = (u - v) / 2;
     const dvec3 d = glm::normalize(dvec3(x, y, 1 - std::abs(x) - std::abs(y)));
-    return glm::normalize(dvec3(d.x, d.y, std::max(d.z, std::sin(kPi / 60))));
+    return glm::normalize(dvec3(d.x, d.y, std::max(d.z, std::sin(pi / 60))));
 }
 
 /// Returns the i-th point of a sequence that fills the unit square evenly (Roberts 2018).
@@ -51,7 +50,7 @@ dvec2 spread(uint64_t i) {
 /// Turns a point of the square to a direction about n, distributed by the cosine (Duff et al. 2017).
 dvec3 byCosine(dvec3 n, dvec2 p) {
     const double sign = n.z >= 0 ? 1 : -1, a = -1 / (sign + n.z), b = n.x * n.y * a, r = std::sqrt(p.x),
-                 turn = 2 * kPi * p.y;
+                 turn = 2 * pi * p.y;
     const dvec3 x(1 + sign * n.x * n.x * a, sign * b, -sign * n.x), y(b, sign + n.y * n.y * a, -n.y);
     return glm::normalize(x * (r * std::cos(turn)) + y * (r * std::sin(turn)) + n * std::sqrt(std::max(0.0, 1 - p.x)));
 }
@@ -106,7 +105,7 @@ struct Sums {
             const dvec3 light = byCosine(seen.normal, spread(number * kShadowRays + uint64_t(k)));
             if (caster.isLit(seen, light)) continue;
             const Harmonics lost = harmonicsOf(light);
-            for (size_t i = 0; i < 9; ++i) shadowed[i] -= kPi / kShadowRays * lost[i];
+            for (size_t i = 0; i < 9; ++i) shadowed[i] -= pi / kShadowRays * lost[i];
         }
     }
     void append(std::vector<glm::vec4>& texels) const {

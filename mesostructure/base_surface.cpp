@@ -15,10 +15,9 @@ namespace vcp::meso {
 
 namespace {
 
-using glm::dvec2, glm::dvec3;
+using glm::dvec2, glm::dvec3, std::numbers::pi;
 
-constexpr double kPi = std::numbers::pi;
-constexpr std::array<std::string_view, 6> kNames = {"quad", "box", "cylinder", "sphere", "torus", "teapot"};
+constexpr std::array<std::string_view, 6> kSurfaceNames = {"quad", "box", "cylinder", "sphere", "torus", "teapot"};
 
 /// Adds a grid of columns x rows cells over [0, 1]^2. `uv` maps the parameters to tiles.
 void addSheet(BaseSurface& to, int columns, int rows, const std::function<dvec3(double, double)>& at,
@@ -52,7 +51,7 @@ BaseSurface cube(int cells, bool isSphere, double tiles) {
         addSheet(
             made, cells, cells,
             [&](double u, double v) {
-                const auto along = [&](double x) { return isSphere ? std::tan((x - 0.5) * kPi / 2) : 2 * x - 1; };
+                const auto along = [&](double x) { return isSphere ? std::tan((x - 0.5) * pi / 2) : 2 * x - 1; };
                 dvec3 p;
                 p[axis] = sign, p[(axis + 1) % 3] = along(u) * sign, p[(axis + 2) % 3] = along(v);
                 return isSphere ? glm::normalize(p) : p;
@@ -66,7 +65,7 @@ BaseSurface cylinder(double tiles) {
     BaseSurface made;
     constexpr int kAround = 96, kUp = 24;
     const auto ring = [](double u, double r, double z) {
-        return dvec3(r * std::cos(2 * kPi * u), r * std::sin(2 * kPi * u), z);
+        return dvec3(r * std::cos(2 * pi * u), r * std::sin(2 * pi * u), z);
     };
     addSheet(
         made, kAround, kUp, [&](double u, double v) { return ring(u, 1, 2 * v - 1); },
@@ -75,7 +74,7 @@ BaseSurface cylinder(double tiles) {
         addSheet(
             made, kAround, kUp / 2, [&](double u, double v) { return ring(u * end, 1 - v, end); },
             [&](double u, double v) {
-                return tiles * 0.5 * (1 - v) * dvec2(std::cos(2 * kPi * u), std::sin(2 * kPi * u));
+                return tiles * 0.5 * (1 - v) * dvec2(std::cos(2 * pi * u), std::sin(2 * pi * u));
             });
     return made;
 }
@@ -85,8 +84,8 @@ BaseSurface torus(double tiles) {
     addSheet(
         made, 96, 40,
         [](double u, double v) {
-            const double r = 1 + 0.45 * std::cos(2 * kPi * v);
-            return dvec3(r * std::cos(2 * kPi * u), r * std::sin(2 * kPi * u), 0.45 * std::sin(2 * kPi * v));
+            const double r = 1 + 0.45 * std::cos(2 * pi * v);
+            return dvec3(r * std::cos(2 * pi * u), r * std::sin(2 * pi * u), 0.45 * std::sin(2 * pi * v));
         },
         [&](double u, double v) { return tiles * dvec2(3 * u, v); });
     return made;
@@ -139,9 +138,9 @@ void addRound(BaseSurface& to, std::span<const Profile> profiles, double tiles) 
             [&](double u, double v) {
                 const dvec2 p = bezier(profile, v);
                 // The turn is reversed, so that v, which goes down, and u are counter-clockwise from outside.
-                return dvec3(p.x * std::cos(2 * kPi * u), -p.x * std::sin(2 * kPi * u), p.y);
+                return dvec3(p.x * std::cos(2 * pi * u), -p.x * std::sin(2 * pi * u), p.y);
             },
-            [&](double u, double v) { return tiles * dvec2(4 * u, (length + v * span) / kPi); });
+            [&](double u, double v) { return tiles * dvec2(4 * u, (length + v * span) / pi); });
         length += span;
     }
 }
@@ -166,7 +165,7 @@ void addTube(BaseSurface& to, std::span<const BicubicPatch> patches, double tile
 
 }  // namespace
 
-std::span<const std::string_view> baseSurfaceNames() { return kNames; }
+std::span<const std::string_view> baseSurfaceNames() { return kSurfaceNames; }
 
 Result<BaseSurface> makeBaseSurface(std::string_view name, double tiles) {
     if (!(tiles > 0) || !(tiles <= 4096))
@@ -189,9 +188,9 @@ Result<BaseSurface> makeBaseSurface(std::string_view name, double tiles) {
         addRound(made, kBody, tiles), addRound(made, kLid, tiles), addTube(made, kHandle, tiles),
             addTube(made, kSpout, tiles);
     else
-        return Error{
-            .code = ErrorCode::Usage,
-            .message = fmt::format("there is no base surface \"{}\"; there are {}", name, fmt::join(kNames, ", "))};
+        return Error{.code = ErrorCode::Usage,
+                     .message = fmt::format("there is no base surface \"{}\"; there are {}", name,
+                                            fmt::join(kSurfaceNames, ", "))};
     // The two ends of a turn would differ in their last bits.
     for (dvec3& p : made.positions)
         for (int axis = 0; axis < 3; ++axis) p[axis] = std::round(p[axis] * 0x1p40) * 0x1p-40;

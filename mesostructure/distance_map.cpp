@@ -15,8 +15,9 @@ namespace vcp::meso {
 
 namespace {
 
+using std::numbers::pi;
+
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kPi = std::numbers::pi;
 
 /// Works on one line of cells along an axis: finds the least of base[j] + (edge * gap(j - u))^2 over j >= u, for every
 /// u. gap(k) is k between centres, else max(0, k - 1). It is a lower envelope of parabolas, built and queried from high
@@ -103,7 +104,7 @@ namespace {
 /// Returns cosine and sine of a part of a turn; exact at quarters, and alike but for signs from quarter to quarter.
 glm::dvec2 onCircle(int part, int parts) {
     const int quarter = 4 * part / parts, rest = 4 * part % parts;
-    const double angle = 0.5 * kPi * rest / parts;
+    const double angle = 0.5 * pi * rest / parts;
     const glm::dvec2 p(std::cos(angle), std::sin(angle));
     const glm::dvec2 turned[] = {{p.x, p.y}, {-p.y, p.x}, {-p.x, -p.y}, {p.y, -p.x}};
     return turned[quarter % 4];
@@ -161,7 +162,7 @@ glm::ivec3 signOf(Cones cones, int cone) {
 /// meet.
 std::vector<glm::dvec2> cutToWedge(glm::dvec2 lower, glm::dvec2 upper, double from, double to) {
     std::vector<glm::dvec2> polygon{{lower.x, lower.y}, {upper.x, lower.y}, {upper.x, upper.y}, {lower.x, upper.y}};
-    if (to - from >= 2 * kPi) return polygon;
+    if (to - from >= 2 * pi) return polygon;
     // The left of the first edge and the right of the second are kept; wedges are at most half planes.
     for (const auto& [angle, side] : {std::pair(from, 1.0), std::pair(to, -1.0)}) {
         const glm::dvec2 normal = side * glm::dvec2(-std::sin(angle), std::cos(angle));
@@ -198,14 +199,14 @@ struct Offset {
 
 /// Returns offsets of cells that hold a point in the cone from some point of the cell at 0, nearest first, up to `cap`.
 std::vector<Offset> offsetsInCone(const TileGrid& grid, Cones cones, int cone, double cap) {
-    const double wedge = 2 * kPi / cones.azimuth, band = kPi / cones.elevation;
+    const double wedge = 2 * pi / cones.azimuth, band = pi / cones.elevation;
     const int azimuth = cone % cones.azimuth, elevation = cone / cones.azimuth;
     // At the axes the signs decide, so a ray's cone is exact there.
     const auto slackAt = [&](int border) {
         return cones.azimuth == 2 || (cones.azimuth % 4 == 0 && border % (cones.azimuth / 4) == 0) ? 0 : kConeSlack;
     };
     const double from = azimuth * wedge - slackAt(azimuth), to = (azimuth + 1) * wedge + slackAt(azimuth + 1);
-    const double slackZ = cones.elevation == 2 ? 0 : kConeSlack, low = -kPi / 2 + elevation * band - slackZ,
+    const double slackZ = cones.elevation == 2 ? 0 : kConeSlack, low = -pi / 2 + elevation * band - slackZ,
                  high = low + band + 2 * slackZ;
     const glm::ivec3 reach = glm::ivec3(glm::ceil(glm::dvec3(cap) / grid.cell)) + 1;
     std::vector<Offset> offsets;

@@ -103,8 +103,8 @@ constexpr std::array<Named, 8> kFormulas{{{"fbm", 0.15, fbm},
                                           {"ripple", 0.15, ripple},
                                           {"bark", 0.1, bark},
                                           {"cobble", 0.1, cobble}}};
-constexpr std::array<std::string_view, 11> kNames{"fbm",    "ridged", "hemispheres", "maze", "blocks", "bricks",
-                                                  "ripple", "needle", "edge",        "bark", "cobble"};
+constexpr std::array<std::string_view, 11> kHeightFieldNames{
+    "fbm", "ridged", "hemispheres", "maze", "blocks", "bricks", "ripple", "needle", "edge", "bark", "cobble"};
 
 /// Carves a maze by recursive backtracking on a torus of 8 x 8 rooms; walls are an eighth of a room, or one texel.
 void carveMaze(HeightMap& map, uint32_t seed) {
@@ -140,10 +140,10 @@ void carveMaze(HeightMap& map, uint32_t seed) {
 
 }  // namespace
 
-std::span<const std::string_view> heightFieldNames() { return kNames; }
+std::span<const std::string_view> heightFieldNames() { return kHeightFieldNames; }
 
 Result<HeightMap> makeHeightField(std::string_view name, int texels, uint32_t seed) {
-    if (std::ranges::find(kNames, name) == kNames.end())
+    if (std::ranges::find(kHeightFieldNames, name) == kHeightFieldNames.end())
         return Error{.code = ErrorCode::Usage, .message = fmt::format("there is no height field \"{}\"", name)};
     if (texels < 8 || texels > kMaxGridEdge)
         return Error{

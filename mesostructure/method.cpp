@@ -11,24 +11,24 @@ namespace vcp::meso {
 
 namespace {
 
-constexpr std::array<std::string_view, 18> kNames = {"relief-linear",
-                                                     "relief-binary",
-                                                     "relief-secant",
-                                                     "relief-secant-printed",
-                                                     "relief-illinois",
-                                                     "pyramid",
-                                                     "sphere",
-                                                     "dm",
-                                                     "ddm",
-                                                     "ddm-quadric",
-                                                     "ddm-quadric-fitted",
-                                                     "boxes",
-                                                     "cells",
-                                                     "gdm",
-                                                     "gdm-visibility",
-                                                     "gdm-safe",
-                                                     "vdm",
-                                                     "slices"};
+constexpr std::array<std::string_view, 18> kMethodNames = {"relief-linear",
+                                                           "relief-binary",
+                                                           "relief-secant",
+                                                           "relief-secant-printed",
+                                                           "relief-illinois",
+                                                           "pyramid",
+                                                           "sphere",
+                                                           "dm",
+                                                           "ddm",
+                                                           "ddm-quadric",
+                                                           "ddm-quadric-fitted",
+                                                           "boxes",
+                                                           "cells",
+                                                           "gdm",
+                                                           "gdm-visibility",
+                                                           "gdm-safe",
+                                                           "vdm",
+                                                           "slices"};
 constexpr std::array<Refinement, 5> kRefinements = {Refinement::None, Refinement::Binary, Refinement::Secant,
                                                     Refinement::SecantAsPrinted, Refinement::Illinois};
 constexpr int kDefaultCells = 64, kDefaultPoints = 32;
@@ -162,7 +162,7 @@ Result<std::unique_ptr<Marcher>> Method::marcher() const {
     }
 }
 
-std::span<const std::string_view> methodNames() { return kNames; }
+std::span<const std::string_view> methodNames() { return kMethodNames; }
 
 bool methodFits(std::string_view name, const Asset& asset) {
     return asset.heights.has_value() || !(name.starts_with("relief") || name == "pyramid");
@@ -175,10 +175,11 @@ GdmOptions tracedBy(const Shape& shape, const MethodOptions& options) {
 
 Result<Method> buildMethod(const Asset& asset, const Shape& shape, const MethodOptions& options) {
     const std::string& name = options.name;
-    const auto known = std::ranges::find(kNames, name);
-    if (known == kNames.end())
-        return Error{.code = ErrorCode::Usage,
-                     .message = fmt::format("there is no method \"{}\"; there are {}", name, fmt::join(kNames, ", "))};
+    const auto known = std::ranges::find(kMethodNames, name);
+    if (known == kMethodNames.end())
+        return Error{
+            .code = ErrorCode::Usage,
+            .message = fmt::format("there is no method \"{}\"; there are {}", name, fmt::join(kMethodNames, ", "))};
     if (!methodFits(name, asset))
         return Error{.code = ErrorCode::Usage,
                      .message = fmt::format("{} is for height fields; {} is a solid", name, asset.name)};
@@ -188,7 +189,7 @@ Result<Method> buildMethod(const Asset& asset, const Shape& shape, const MethodO
         method.heights = &*asset.heights;
         if (name != "pyramid")
             method.relief = {.steps = options.steps,
-                             .refinement = kRefinements[size_t(known - kNames.begin())],
+                             .refinement = kRefinements[size_t(known - kMethodNames.begin())],
                              .refinements = options.refinements,
                              .tolerance = options.tolerance};
         return method;

@@ -175,8 +175,8 @@ double blades(dvec3 p, uint32_t seed) {
     return std::min(f, floorBelow(p, 0.02));
 }
 
-constexpr std::array<std::string_view, 12> kNames{"bead",   "beads",  "ball",   "chain",  "weave",  "bars",
-                                                  "scales", "kitten", "flakes", "gyroid", "sponge", "blades"};
+constexpr std::array<std::string_view, 12> kSolidNames{"bead",   "beads",  "ball",   "chain",  "weave",  "bars",
+                                                       "scales", "kitten", "flakes", "gyroid", "sponge", "blades"};
 
 std::function<double(dvec3)> fieldNamed(std::string_view name, uint32_t seed) {
     if (name == "bead") return bead;
@@ -249,7 +249,7 @@ private:
 
 }  // namespace
 
-std::span<const std::string_view> solidNames() { return kNames; }
+std::span<const std::string_view> solidNames() { return kSolidNames; }
 
 Result<Solid> makeSolid(std::string_view name, uint32_t seed) {
     Solid solid{{1, 1, name == "bead" ? 1 : name == "kitten" ? 0.5 : 0.25}, fieldNamed(name, seed)};

@@ -6,6 +6,7 @@
 #include <condition_variable>
 
 #include "octree/io/content_hash.h"
+#include "streaming/steady_seconds.h"
 
 namespace vcp {
 
@@ -41,10 +42,7 @@ struct FaultyReader::Sleep {
 FaultyReader::FaultyReader(std::shared_ptr<const ByteReader> reader, const Faults& faults, FaultClock clock)
     : reader_(std::move(reader)), faults_(faults), clock_(std::move(clock)), sleep_(std::make_unique<Sleep>()) {
     sleep_->isReal = !clock_.sleep;
-    if (!clock_.now)
-        clock_.now = [] {
-            return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-        };
+    if (!clock_.now) clock_.now = steadySeconds;
 }
 
 FaultyReader::~FaultyReader() = default;

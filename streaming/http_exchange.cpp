@@ -4,13 +4,13 @@
 #include <array>
 #include <cctype>
 #include <charconv>
-#include <chrono>
 #include <utility>
 
 #include <curl/curl.h>
 #include <fmt/format.h>
 
 #include "streaming/exchange_pace.h"
+#include "streaming/steady_seconds.h"
 
 namespace vcp {
 
@@ -68,10 +68,6 @@ std::string boundaryOf(std::string_view contentType) {
     if (boundary.size() >= 2 && boundary.front() == '"' && boundary.back() == '"')
         boundary = boundary.substr(1, boundary.size() - 2);
     return std::string(boundary);
-}
-
-double steadySeconds() {
-    return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
 Error transient(std::string message) { return {.code = ErrorCode::Io, .message = std::move(message)}; }

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "octree/io/caught.h"
+#include "streaming/steady_seconds.h"
 
 namespace vcp {
 
@@ -34,10 +35,6 @@ void giveWay(uint32_t threads) {
     const int steps = 8 + int(std::lround(std::log(std::max(threads, 2u) / 2.0) / std::log(1.25)));
     const auto thread = static_cast<id_t>(::gettid());
     ::setpriority(PRIO_PROCESS, thread, ::getpriority(PRIO_PROCESS, thread) + steps);
-}
-
-double steadySeconds() {
-    return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
 }  // namespace

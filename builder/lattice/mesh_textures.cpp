@@ -11,7 +11,7 @@ namespace vcp {
 
 namespace {
 
-constexpr size_t kGrain = 4096;  // triangles that a thread takes at a time
+constexpr size_t kTriangleGrain = 4096;  // triangles that a thread takes at a time
 
 bool isBefore(glm::i32vec3 a, glm::i32vec3 b) { return std::tie(a.x, a.y, a.z) < std::tie(b.x, b.y, b.z); }
 
@@ -62,12 +62,12 @@ std::array<TexturePoint, 3> found(const std::vector<TexturedTriangle>& known, co
 
 void addTextures(LatticeMesh& mesh, std::vector<TexturedTriangle> known) {
     if (known.empty()) return;
-    tbb::parallel_for(tbb::blocked_range<size_t>(0, known.size(), kGrain), [&](const auto& range) {
+    tbb::parallel_for(tbb::blocked_range<size_t>(0, known.size(), kTriangleGrain), [&](const auto& range) {
         for (size_t k = range.begin(); k < range.end(); ++k) sortCorners(known[k]);
     });
     tbb::parallel_sort(known.begin(), known.end(), isLess);
     mesh.textures.resize(mesh.triangles.size());
-    tbb::parallel_for(tbb::blocked_range<size_t>(0, mesh.triangles.size(), kGrain), [&](const auto& range) {
+    tbb::parallel_for(tbb::blocked_range<size_t>(0, mesh.triangles.size(), kTriangleGrain), [&](const auto& range) {
         for (size_t k = range.begin(); k < range.end(); ++k) {
             const auto& [a, b, c] = mesh.triangles[k];
             mesh.textures[k] = found(known, {mesh.positions[a], mesh.positions[b], mesh.positions[c]});

@@ -14,10 +14,10 @@ namespace vcp {
 
 namespace {
 
-constexpr size_t kGrain = 4096;
+constexpr size_t kVertexGrain = 4096;  // vertices or triangles that a thread takes at a time
 
 auto placeOf(const VertexImage& v) { return std::tie(v.position.x, v.position.y, v.position.z); }
-bool isBefore(const VertexImage& a, const VertexImage& b) { return placeOf(a) < placeOf(b); }
+bool liesBefore(const VertexImage& a, const VertexImage& b) { return placeOf(a) < placeOf(b); }
 
 /// What a thread hands on: triangles, and vertices to the bins of triangles.
 struct Batches {
@@ -34,7 +34,7 @@ struct Batches {
 
 Result<void> VertexStep::run(size_t bin, const LatticeMesh& mesh) {
     std::vector<uint32_t> binOf(mesh.positions.size());
-    tbb::parallel_for(tbb::blocked_range<size_t>(0, binOf.size(), kGrain), [&](const auto& range) {
+    tbb::parallel_for(tbb::blocked_range<size_t>(0, binOf.size(), kVertexGrain), [&](const auto& range) {
         for (size_t v = range.begin(); v < range.end(); ++v)
             binOf[v] = uint32_t(partition_.binOf(grid_.pageOf(mesh.positions[v])));
     });
@@ -66,15 +66,15 @@ Result<void> VertexStep::run(size_t bin, const LatticeMesh& mesh) {
 }
 
 bool joinVertices(std::vector<LatticeTriangle>& triangles, std::vector<VertexImage> vertices) {
-    tbb::parallel_sort(vertices.begin(), vertices.end(), isBefore);
+    tbb::parallel_sort(vertices.begin(), vertices.end(), liesBefore);
     std::atomic<bool> areAllThere = true;
-    tbb::parallel_for(tbb::blocked_range<size_t>(0, triangles.size(), kGrain), [&](const auto& range) {
+    tbb::parallel_for(tbb::blocked_range<size_t>(0, triangles.size(), kVertexGrain), [&](const auto& range) {
         for (size_t k = range.begin(); k < range.end(); ++k) {
             LatticeTriangle& t = triangles[k];
             for (int i = 0; i < 3; ++i) {
                 if (t.normal[i] != kUnknownNormal) continue;
                 const VertexImage wanted{t.corner[i], 0, 0};
-                const auto at = std::lower_bound(vertices.begin(), vertices.end(), wanted, isBefore);
+                const auto at = std::lower_bound(vertices.begin(), vertices.end(), wanted, liesBefore);
                 if (at == vertices.end() || at->position != t.corner[i]) {
                     areAllThere = false;
                     continue;

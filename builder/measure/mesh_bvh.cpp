@@ -14,7 +14,6 @@ namespace vcp {
 
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
 constexpr uint32_t kLeafTriangles = 4;
 constexpr int kBins = 16;

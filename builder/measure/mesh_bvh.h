@@ -25,9 +25,12 @@
 
 namespace vcp {
 
+/// The distance within which everything lies.
+inline constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
 struct NearestPoint {
     glm::dvec3 point{0};
-    double distance = std::numeric_limits<double>::infinity();
+    double distance = kInfinity;
     uint32_t triangle = 0;
 };
 
@@ -46,16 +49,15 @@ public:
     explicit MeshBvh(const IndexedMesh& mesh);
 
     /// Returns the nearest point of the mesh within `within` of p; any one among equals. Any thread.
-    [[nodiscard]] std::optional<NearestPoint> nearestPoint(
-        glm::dvec3 p, double within = std::numeric_limits<double>::infinity()) const;
+    [[nodiscard]] std::optional<NearestPoint> nearestPoint(glm::dvec3 p, double within = kInfinity) const;
 
     /// Returns the first hit with tMin <= t <= tMax. Triangles seen exactly edge-on are not hit. Any thread.
     [[nodiscard]] std::optional<MeshHit> nearestHit(glm::dvec3 origin, glm::dvec3 direction, double tMin = 0,
-                                                    double tMax = std::numeric_limits<double>::infinity()) const;
+                                                    double tMax = kInfinity) const;
     [[nodiscard]] bool anyHit(glm::dvec3 origin, glm::dvec3 direction, double tMin, double tMax) const;
     /// Returns every hit, sorted by t. A ray through a shared edge reports both triangles.
     [[nodiscard]] std::vector<MeshHit> allHits(glm::dvec3 origin, glm::dvec3 direction, double tMin = 0,
-                                               double tMax = std::numeric_limits<double>::infinity()) const;
+                                               double tMax = kInfinity) const;
 
     /// Returns the triangles whose boxes touch the box low, high. Any thread.
     [[nodiscard]] std::vector<uint32_t> trianglesNear(glm::dvec3 low, glm::dvec3 high) const;

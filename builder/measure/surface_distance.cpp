@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <mutex>
 #include <numbers>
 
@@ -17,7 +16,6 @@ namespace vcp {
 
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr uint64_t kBlock = SampleRunner::kBlock;
 
 /// A convex polygon, of a triangle cut off at the walls of a box: up to 3 + 6 corners.

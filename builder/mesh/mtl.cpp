@@ -18,7 +18,6 @@ namespace {
 
 constexpr uint64_t kMostBytes = 16u << 20;
 constexpr size_t kMostMaterials = 65536;
-constexpr size_t kLineLimit = 64 * 1024;
 
 // Takes words off the front of a line.
 class Words {

@@ -18,8 +18,7 @@ namespace vcp {
 namespace {
 
 constexpr size_t kStatementLimit = 1024 * 1024;
-constexpr size_t kStartBytes = 256 * 1024;  // bytes that are searched for colours
-constexpr std::string_view kUtf8Mark = "\xEF\xBB\xBF";
+constexpr size_t kColouredStartBytes = 256 * 1024;  // bytes that are searched for colours
 
 // Returns the position after the last line end that no backslash precedes.
 size_t afterLastStatement(std::string_view text) {
@@ -111,7 +110,7 @@ private:
     // Whole numbers 0..255 and fractions 0..1 are told apart by the start of the file alone, so that the answer
     // does not depend on where the stream stands.
     Result<void> lookForColours() {
-        VCP_TRY_ASSIGN(auto start, source_.window(kStartBytes));
+        VCP_TRY_ASSIGN(auto start, source_.window(kColouredStartBytes));
         if (start.size() < source_.remaining()) start = start.substr(0, afterLastStatement(start));
         begin_ = start.data();
         end_ = begin_ + start.size();

@@ -17,7 +17,7 @@
 namespace vcp {
 namespace {
 
-constexpr size_t kLineLimit = 1024 * 1024;
+constexpr size_t kElementLineLimit = 1024 * 1024;  // bytes; a face may have many vertices
 
 // The state that the two encodings share: how far the stream is, and what is wrong.
 class OffStream : public MeshStream {
@@ -103,7 +103,7 @@ private:
     static size_t afterLastLine(std::string_view text) { return text.rfind('\n') + 1; }
 
     Result<void> readSome(MeshChunk& chunk) override {
-        VCP_TRY_ASSIGN(const auto text, source_.wholeWindow(afterLastLine, kLineLimit));
+        VCP_TRY_ASSIGN(const auto text, source_.wholeWindow(afterLastLine, kElementLineLimit));
         if (text.empty()) return truncated();
         begin_ = text.data();
         const char* const end = begin_ + text.size();

@@ -16,9 +16,6 @@
 namespace vcp {
 namespace {
 
-constexpr size_t kLineLimit = 64 * 1024;
-constexpr std::string_view kUtf8Mark = "\xEF\xBB\xBF";
-
 std::string_view withoutComment(std::string_view line) { return line.substr(0, line.find('#')); }
 
 std::string_view firstWord(std::string_view text) {
@@ -43,9 +40,9 @@ size_t keywordBytes(std::string_view word, OffHeader& header, bool& otherDimensi
     return take("OFF") ? word.size() - rest.size() : 0;
 }
 
-class HeaderReader {
+class OffHeaderReader {
 public:
-    explicit HeaderReader(ByteSource& source) : source_(source) {}
+    explicit OffHeaderReader(ByteSource& source) : source_(source) {}
 
     Result<OffHeader> read() {
         VCP_TRY(nextLine());
@@ -150,6 +147,6 @@ bool looksLikeOff(std::string_view start) {
     return false;
 }
 
-Result<OffHeader> readOffHeader(ByteSource& source) { return HeaderReader(source).read(); }
+Result<OffHeader> readOffHeader(ByteSource& source) { return OffHeaderReader(source).read(); }
 
 }  // namespace vcp

@@ -19,7 +19,7 @@
 namespace vcp {
 namespace {
 
-constexpr size_t kStartBytes = 1024;
+constexpr size_t kFormatStartBytes = 1024;  // bytes that tell the format
 constexpr std::array<std::string_view, 7> kFormats{"ply", "obj", "stl", "off", "gltf", "glb", "drc"};
 
 std::string lower(std::string text) {
@@ -64,9 +64,9 @@ Result<std::unique_ptr<MeshStream>> openMesh(const std::filesystem::path& path, 
             .code = ErrorCode::Usage,
             .message = fmt::format("unknown mesh format {}; known are {}", shown(wanted), fmt::join(kFormats, ", "))};
     VCP_TRY_ASSIGN(auto source, ByteSource::open(path));
-    VCP_TRY_ASSIGN(const auto window, source.window(kStartBytes));
+    VCP_TRY_ASSIGN(const auto window, source.window(kFormatStartBytes));
     if (source.atEnd()) return source.error(ErrorCode::InvalidInput, "", 0, "the file is empty");
-    std::string format = formatByContent(window.substr(0, kStartBytes), source);
+    std::string format = formatByContent(window.substr(0, kFormatStartBytes), source);
     if (format.empty()) format = wanted;
     if (format.empty()) format = formatByName(path);
 

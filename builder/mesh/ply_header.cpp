@@ -53,9 +53,9 @@ std::vector<std::string_view> wordsOf(std::string_view line) {
 }
 
 // Reads the header line by line; `line` and `byte` say where it is.
-class HeaderReader {
+class PlyHeaderReader {
 public:
-    explicit HeaderReader(ByteSource& source) : source_(source) {}
+    explicit PlyHeaderReader(ByteSource& source) : source_(source) {}
 
     Result<PlyHeader> read() {
         VCP_TRY(findLineBreak());
@@ -207,6 +207,6 @@ const PlyElement* PlyHeader::find(std::string_view element) const {
     return found == elements.end() ? nullptr : &*found;
 }
 
-Result<PlyHeader> readPlyHeader(ByteSource& source) { return HeaderReader(source).read(); }
+Result<PlyHeader> readPlyHeader(ByteSource& source) { return PlyHeaderReader(source).read(); }
 
 }  // namespace vcp

@@ -19,7 +19,6 @@ constexpr size_t kHeaderBytes = 84;  // text, then the count
 constexpr size_t kFacetBytes = 50;   // normal, three vertices, attributes
 constexpr size_t kNormalBytes = 12;
 constexpr uint64_t kMostFacets = 0xffffffff;
-constexpr size_t kLineLimit = 64 * 1024;
 
 static_assert(std::endian::native == std::endian::little, "STL is little endian");
 

@@ -15,10 +15,6 @@ namespace vcp {
 
 namespace {
 
-Error tempError(const std::filesystem::path& file, const char* what, int code) {
-    return systemError(file, what, code, kWhenTempIsFull);
-}
-
 Error refused(const std::filesystem::path& file, const char* why) {
     return {.code = ErrorCode::Io, .message = why, .file = file.string()};
 }
@@ -57,6 +53,10 @@ bool isRegular(int folder, const char* name) {
 }
 
 }  // namespace
+
+Error tempError(const std::filesystem::path& file, const char* what, int code) {
+    return systemError(file, what, code, kWhenTempIsFull);
+}
 
 Error damagedTempFile(const std::filesystem::path& file, std::optional<uint64_t> byte) {
     return {.code = ErrorCode::InvalidInput,

@@ -26,6 +26,9 @@ inline constexpr const char* kTempSuffix = ".spill";
 /// What to do about a folder that is full.
 inline constexpr const char* kWhenTempIsFull = "free some space, or choose a temporary folder with more";
 
+/// Returns the error of a call of the system, with errno `code`: what has failed with a temporary file.
+Error tempError(const std::filesystem::path& file, const char* what, int code);
+
 /// Returns the error for bytes that differ from what was written: in `file`, at `byte`.
 Error damagedTempFile(const std::filesystem::path& file, std::optional<uint64_t> byte = {});
 

@@ -9,14 +9,6 @@
 
 namespace vcp {
 
-namespace {
-
-Error tempError(const std::filesystem::path& file, const char* what, int code) {
-    return systemError(file, what, code, kWhenTempIsFull);
-}
-
-}  // namespace
-
 void TempSpace::addDisk(int64_t bytes) {
     const uint64_t now = disk_ += uint64_t(bytes);
     uint64_t peak = peakDisk_;

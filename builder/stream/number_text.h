@@ -10,6 +10,12 @@
 
 namespace vcp {
 
+/// What texts in UTF-8 may begin with.
+inline constexpr std::string_view kUtf8Mark = "\xEF\xBB\xBF";
+
+/// Bytes of a line in a text: longer ones are refused.
+inline constexpr size_t kLineLimit = 64 * 1024;
+
 inline bool isSpace(char c) { return c == ' ' || (c >= '\t' && c <= '\r'); }  // tab, LF, VT, FF, CR
 inline bool isBlank(char c) { return isSpace(c) && c != '\n'; }
 

@@ -22,7 +22,7 @@ using OpenMesh::EdgeHandle, OpenMesh::FaceHandle, OpenMesh::HalfedgeHandle, Open
 using Point = HalfEdges::Point;
 using Quadric = OpenMesh::Geometry::QuadricT<double>;
 
-constexpr size_t kMostTriangles = 20'000'000;
+constexpr size_t kMostDecimatedTriangles = 20'000'000;
 constexpr uint32_t kMostAtCorner = 4096;  // each collapse looks at all neighbours of neighbours
 // What it costs to move a corner within its plane, so that flat parts get no slivers.
 constexpr double kWithinPlane = 1e-6;
@@ -231,9 +231,10 @@ BaseSurface whatIsLeft(const BaseSurface& surface, const LinkedSurface& linked, 
 Result<void> checkSize(const LinkedSurface& linked) {
     const HalfEdges& mesh = linked.mesh;
     if (mesh.n_faces() == 0) return Error{.message = "no triangle has three different corners"};
-    if (mesh.n_faces() > kMostTriangles)
-        return Error{.code = ErrorCode::Limit,
-                     .message = fmt::format("has more than {} triangles to decimate in memory", kMostTriangles)};
+    if (mesh.n_faces() > kMostDecimatedTriangles)
+        return Error{
+            .code = ErrorCode::Limit,
+            .message = fmt::format("has more than {} triangles to decimate in memory", kMostDecimatedTriangles)};
     for (const auto vertex : mesh.vertices())
         if (mesh.valence(vertex) > kMostAtCorner)
             return Error{.code = ErrorCode::Limit,

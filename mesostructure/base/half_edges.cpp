@@ -9,7 +9,7 @@ namespace vcp::meso {
 
 namespace {
 
-constexpr size_t kMostTriangles = size_t{1} << 29;  // OpenMesh numbers halfedges with 31 bits
+constexpr size_t kMostLinkedTriangles = size_t{1} << 29;  // OpenMesh numbers halfedges with 31 bits
 
 std::string shownPlace(glm::dvec3 p) { return fmt::format("({:.9g}, {:.9g}, {:.9g})", p.x, p.y, p.z); }
 
@@ -26,7 +26,7 @@ public:
     Linker(const BaseSurface& surface, LinkedSurface& made) : surface_(surface), made_(made) {}
 
     Result<void> link() {
-        if (surface_.triangles.size() > kMostTriangles)
+        if (surface_.triangles.size() > kMostLinkedTriangles)
             return Error{.code = ErrorCode::Limit, .message = "the surface has too many triangles for half-edges"};
         chooseFaces();
         VCP_TRY(pairSides());

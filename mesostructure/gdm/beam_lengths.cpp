@@ -8,7 +8,7 @@ namespace vcp::meso {
 
 namespace {
 
-constexpr double kPi = std::numbers::pi;
+using std::numbers::pi;
 
 int wrappedInto(int i, int n) { return (i % n + n) % n; }
 
@@ -16,7 +16,7 @@ int wrappedInto(int i, int n) { return (i % n + n) % n; }
 std::vector<double> turningPoints(const double (&interval)[2]) {
     std::vector<double> angles{interval[0], interval[1]};
     for (int quarter = -2; quarter <= 6; ++quarter)
-        if (const double angle = quarter * kPi / 2; angle > interval[0] && angle < interval[1]) angles.push_back(angle);
+        if (const double angle = quarter * pi / 2; angle > interval[0] && angle < interval[1]) angles.push_back(angle);
     return angles;
 }
 
@@ -31,7 +31,7 @@ Slopes slopesOf(const Beam& beam, glm::dvec3 cell) {
     std::vector<glm::dvec3> directions;
     for (const double azimuth : turningPoints(beam.azimuth))
         for (double elevation : turningPoints(beam.elevation)) {
-            elevation = std::clamp(elevation, -kPi / 2, kPi / 2);
+            elevation = std::clamp(elevation, -pi / 2, pi / 2);
             directions.emplace_back(std::cos(elevation) * std::cos(azimuth), std::cos(elevation) * std::sin(azimuth),
                                     std::sin(elevation));
         }
@@ -59,9 +59,9 @@ Slopes slopesOf(const Beam& beam, glm::dvec3 cell) {
 }  // namespace
 
 Beam beamOf(int azimuths, int elevations, int azimuth, int elevation, double slack) {
-    const double wedge = 2 * kPi / azimuths, band = kPi / elevations;
+    const double wedge = 2 * pi / azimuths, band = pi / elevations;
     return {{azimuth * wedge - slack, (azimuth + 1) * wedge + slack},
-            {-kPi / 2 + elevation * band - slack, -kPi / 2 + (elevation + 1) * band + slack}};
+            {-pi / 2 + elevation * band - slack, -pi / 2 + (elevation + 1) * band + slack}};
 }
 
 BeamGrid::BeamGrid(glm::ivec3 cells, glm::dvec3 cell, std::span<const uint8_t> occupied, double open)

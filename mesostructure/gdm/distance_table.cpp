@@ -10,7 +10,7 @@ namespace vcp::meso {
 
 namespace {
 
-constexpr double kPi = std::numbers::pi;
+using std::numbers::pi;
 
 /// Returns the way from a height to the slab's top or bottom.
 double toBoundary(double z, double top, double rise) { return rise > 0 ? (top - z) / rise : z / -rise; }
@@ -18,12 +18,12 @@ double toBoundary(double z, double top, double rise) { return rise > 0 ? (top - 
 }  // namespace
 
 double DirectionGrid::theta(int i) const {
-    const double from = downwards ? kPi / 2 : 0;
-    return from + (kPi - from) * (i + 0.5) / thetas;
+    const double from = downwards ? pi / 2 : 0;
+    return from + (pi - from) * (i + 0.5) / thetas;
 }
 
 glm::dvec3 DirectionGrid::direction(int i, int phi) const {
-    const double polar = theta(i), turn = 2 * kPi * phi / phis;
+    const double polar = theta(i), turn = 2 * pi * phi / phis;
     return {std::sin(polar) * std::cos(turn), std::sin(polar) * std::sin(turn), std::cos(polar)};
 }
 

@@ -5,30 +5,29 @@
 
 #include <fmt/format.h>
 
+#include "octree/page/broken_page.h"
+
 namespace vcp {
 
 namespace {
 
 constexpr uint64_t align16(uint64_t bytes) { return (bytes + 15) & ~uint64_t{15}; }
 
-Error broken(uint64_t byte, std::string what) {
-    return {.code = ErrorCode::InvalidInput, .message = std::move(what), .element = "page", .byte = byte};
-}
-
 Result<void> checkHeader(const PageHeader& h, uint64_t bytes) {
-    if (h.magic != PageHeader::kMagic) return broken(0, "not a page");
-    if (h.log2Cells < 1 || h.log2Cells > 7) return broken(4, "page size out of range");
+    if (h.magic != PageHeader::kMagic) return brokenPage(0, "not a page");
+    if (h.log2Cells < 1 || h.log2Cells > 7) return brokenPage(4, "page size out of range");
     if (h.faces > kLeafIndexMask || h.entries > kHardFirstMask + 1 || h.vertices > kField21Mask ||
         h.groups > (1u << 27))
-        return broken(12, "page counts out of range");
+        return brokenPage(12, "page counts out of range");
     if (h.slabLeaves > uint64_t{4} * h.faces)
-        return broken(offsetof(PageHeader, slabLeaves), "fewer vectors than slab leaves");
+        return brokenPage(offsetof(PageHeader, slabLeaves), "fewer vectors than slab leaves");
     if (!(h.certifiedError >= 0) || !std::isfinite(h.certifiedError))
-        return broken(offsetof(PageHeader, certifiedError), "certified error is not a number");
+        return brokenPage(offsetof(PageHeader, certifiedError), "certified error is not a number");
     for (size_t i = 0; i < std::size(h.reserved); ++i)
-        if (h.reserved[i] != 0) return broken(offsetof(PageHeader, reserved) + 4 * i, "reserved bytes must be zero");
+        if (h.reserved[i] != 0)
+            return brokenPage(offsetof(PageHeader, reserved) + 4 * i, "reserved bytes must be zero");
     if (pageSections(h).end != bytes)
-        return broken(12, fmt::format("page counts ask for {} bytes, the page has {}", pageSections(h).end, bytes));
+        return brokenPage(12, fmt::format("page counts ask for {} bytes, the page has {}", pageSections(h).end, bytes));
     return {};
 }
 
@@ -45,12 +44,12 @@ public:
         VCP_TRY(node(page_.header.root, -1, 0, maxDepth, 8));
         for (uint32_t g = 0; g < page_.header.groups; ++g) {
             const uint64_t byte = kPageHeaderBytes + uint64_t{32} * g;
-            if (depth_[g] == 0xff) return broken(byte, "node group without a parent");
+            if (depth_[g] == 0xff) return brokenPage(byte, "node group without a parent");
             for (uint32_t i = 0; i < 8; ++i)
                 VCP_TRY(node(page_.nodes[8 * g + i], g, depth_[g], maxDepth, byte + 4 * i));
         }
         if (soft_ != page_.header.softLeaves || hard_ != page_.header.hardLeaves || slabs_ != page_.header.slabLeaves)
-            return broken(28, "leaf counts do not match the nodes");
+            return brokenPage(28, "leaf counts do not match the nodes");
         return {};
     }
 
@@ -61,15 +60,15 @@ private:
             case kNodeInternal: {
                 const uint32_t child = word & kNodePayloadMask;
                 if (child >= page_.header.groups || int64_t{child} <= group || depth_[child] != 0xff)
-                    return broken(byte, "node names a wrong group of children");
-                if (depth >= maxDepth) return broken(byte, "nodes are nested too deeply");
+                    return brokenPage(byte, "node names a wrong group of children");
+                if (depth >= maxDepth) return brokenPage(byte, "nodes are nested too deeply");
                 depth_[child] = uint8_t(depth + 1);
                 return {};
             }
             case kNodeSoft:
                 ++soft_;
                 if (index + 1 >= page_.header.faces || (word >> kSoftAxisShift & 3u) > 2)
-                    return broken(byte, "soft leaf out of range");
+                    return brokenPage(byte, "soft leaf out of range");
                 return {};
             case kNodeHard:
                 ++hard_;
@@ -84,29 +83,29 @@ private:
     Result<void> slabLeaf(uint32_t word, uint64_t byte) {
         ++slabs_;
         const uint32_t vector = slabVector(word);
-        if (vector >= vectorTaken_.size()) return broken(byte, "slab leaf out of range");
-        if (slabOctants(word) == 0) return broken(byte, "slab leaf has no octants");
-        if (vectorTaken_[vector]) return broken(byte, "slab leaf has another's vector");
+        if (vector >= vectorTaken_.size()) return brokenPage(byte, "slab leaf out of range");
+        if (slabOctants(word) == 0) return brokenPage(byte, "slab leaf has no octants");
+        if (vectorTaken_[vector]) return brokenPage(byte, "slab leaf has another's vector");
         vectorTaken_[vector] = true;
         return {};
     }
 
     Result<void> hardLeaf(uint32_t word, uint64_t byte) {
         const uint32_t first = word & kHardFirstMask;
-        if (first >= page_.header.entries) return broken(byte, "hard leaf out of range");
+        if (first >= page_.header.entries) return brokenPage(byte, "hard leaf out of range");
         StripWalk walk(page_.strips, word);
         if (walk.count() == 0 || walk.count() > page_.header.entries - first)
-            return broken(byte, "hard leaf names too many triangles");
+            return brokenPage(byte, "hard leaf names too many triangles");
         while (walk.next())
             for (const uint32_t v : walk.triangle())
                 if (v >= page_.header.vertices)
-                    return broken(
+                    return brokenPage(
                         pageSections(page_.header).strips + uint64_t{entryBytes(page_.header.vertices)} * walk.entry(),
                         "triangle names a missing vertex");
-        if (!walk.isWhole()) return broken(byte, "strips of a hard leaf are broken");
+        if (!walk.isWhole()) return brokenPage(byte, "strips of a hard leaf are broken");
         // Leaves share no entries, so a small page cannot ask for endless work, here or of a ray.
         named_ += walk.entry() + 1 - first;
-        if (named_ > page_.header.entries) return broken(byte, "hard leaves name too many triangles");
+        if (named_ > page_.header.entries) return brokenPage(byte, "hard leaves name too many triangles");
         return {};
     }
 
@@ -163,12 +162,12 @@ PageView viewOfChecked(std::span<const std::byte> bytes, std::span<const std::by
 }
 
 Result<PageView> parsePage(std::span<const std::byte> bytes, std::span<const std::byte> colours) {
-    if (bytes.size() < kPageHeaderBytes) return broken(0, "page is shorter than its header");
+    if (bytes.size() < kPageHeaderBytes) return brokenPage(0, "page is shorter than its header");
     PageHeader header;
     std::memcpy(&header, bytes.data(), sizeof(PageHeader));
     VCP_TRY(checkHeader(header, bytes.size()));
     if (!colours.empty() && colours.size() != colourPageBytes(header) && colours.size() != texturedPageBytes(header))
-        return broken(0, "colour page does not match its page");
+        return brokenPage(0, "colour page does not match its page");
     const PageView page = viewOfChecked(bytes, colours);
     VCP_TRY(NodeCheck(page).run());
     return page;

@@ -6,6 +6,8 @@
 
 #include <fmt/format.h>
 
+#include "octree/page/broken_page.h"
+
 namespace vcp {
 
 namespace {
@@ -13,38 +15,35 @@ namespace {
 constexpr uint32_t kMaxRoots = 64;  // roots along an axis
 constexpr uint32_t kMaxLevel = 20;
 
-Error broken(uint64_t byte, std::string what) {
-    return {.code = ErrorCode::InvalidInput, .message = std::move(what), .element = "page", .byte = byte};
-}
-
 Result<void> checkHeader(const PaperPageHeader& h, uint64_t bytes, uint32_t log2Cells) {
-    if (h.magic != PaperPageHeader::kMagic) return broken(0, "not a page of this method");
+    if (h.magic != PaperPageHeader::kMagic) return brokenPage(0, "not a page of this method");
     if (h.rootLevel < 1 || h.rootLevel > kMaxLevel || log2Cells > kMaxLevel)
-        return broken(4, "size of the roots out of range");
+        return brokenPage(4, "size of the roots out of range");
     uint64_t roots = 1;
     for (const uint32_t count : h.roots) {
         if (count < 1 || count > kMaxRoots || uint64_t{count} << h.rootLevel > uint64_t{1} << log2Cells)
-            return broken(16, "number of roots out of range");
+            return brokenPage(16, "number of roots out of range");
         roots *= count;
     }
-    if (h.packing > uint32_t(PaperPacking::Octahedral)) return broken(8, "unknown packing");
+    if (h.packing > uint32_t(PaperPacking::Octahedral)) return brokenPage(8, "unknown packing");
     if (h.nodes < roots || (h.nodes - roots) % 8 != 0 || h.nodes > uint32_t{paper::kPaperEmpty})
-        return broken(12, "node count out of range");
+        return brokenPage(12, "node count out of range");
     const auto isLength = [](float x) { return x > 0 && std::isfinite(x); };
     if (!isLength(h.cutoff) || !isLength(h.longest))
-        return broken(offsetof(PaperPageHeader, cutoff), "lengths are not numbers");
+        return brokenPage(offsetof(PaperPageHeader, cutoff), "lengths are not numbers");
     for (size_t i = 0; i < std::size(h.reserved); ++i)
         if (h.reserved[i] != 0)
-            return broken(offsetof(PaperPageHeader, reserved) + 4 * i, "reserved bytes must be zero");
+            return brokenPage(offsetof(PaperPageHeader, reserved) + 4 * i, "reserved bytes must be zero");
     if (paperSections(h).end != bytes)
-        return broken(12, fmt::format("page counts ask for {} bytes, the page has {}", paperSections(h).end, bytes));
+        return brokenPage(12,
+                          fmt::format("page counts ask for {} bytes, the page has {}", paperSections(h).end, bytes));
     return {};
 }
 
 /// Walks the nodes in order. A group of children may be named only once, by an earlier node; so the nodes form trees.
-class NodeCheck {
+class PaperNodeCheck {
 public:
-    explicit NodeCheck(const PaperPageView& page)
+    explicit PaperNodeCheck(const PaperPageView& page)
         : page_(page),
           roots_(page.header.roots[0] * page.header.roots[1] * page.header.roots[2]),
           level_((page.header.nodes - roots_) / 8, kNoLevel) {}
@@ -52,7 +51,7 @@ public:
     Result<void> run() {
         for (uint32_t i = 0; i < page_.header.nodes; ++i) VCP_TRY(node(i));
         if (leaves_ != page_.header.leaves || empties_ != page_.header.emptyNodes)
-            return broken(offsetof(PaperPageHeader, leaves), "node counts do not match the nodes");
+            return brokenPage(offsetof(PaperPageHeader, leaves), "node counts do not match the nodes");
         return {};
     }
 
@@ -62,11 +61,12 @@ private:
     Result<void> node(uint32_t i) {
         const uint64_t byte = paper::kPaperHeaderBytes + uint64_t{4} * i;
         const uint8_t level = i < roots_ ? uint8_t(page_.header.rootLevel) : level_[(i - roots_) / 8];
-        if (level == kNoLevel) return broken(byte, "nodes without a parent");
+        if (level == kNoLevel) return brokenPage(byte, "nodes without a parent");
         const int32_t word = page_.nodes[i];
         if (word < 0) {
             ++leaves_;
-            if (uint64_t{uint32_t(-(word + 1))} + 1 >= page_.header.slices) return broken(byte, "leaf out of range");
+            if (uint64_t{uint32_t(-(word + 1))} + 1 >= page_.header.slices)
+                return brokenPage(byte, "leaf out of range");
             return {};
         }
         if (word >= paper::kPaperEmpty) {
@@ -74,10 +74,10 @@ private:
             return {};
         }
         const auto child = uint32_t(word);
-        if (level == 0) return broken(byte, "nodes are nested too deeply");
+        if (level == 0) return brokenPage(byte, "nodes are nested too deeply");
         if (child < roots_ || child <= i || child >= page_.header.nodes || (child - roots_) % 8 != 0 ||
             level_[(child - roots_) / 8] != kNoLevel)
-            return broken(byte, "node names wrong children");
+            return brokenPage(byte, "node names wrong children");
         level_[(child - roots_) / 8] = uint8_t(level - 1);
         return {};
     }
@@ -96,14 +96,14 @@ PaperSections paperSections(const PaperPageHeader& h) {
 }
 
 Result<PaperPageView> parsePaperPage(std::span<const std::byte> bytes, uint32_t log2Cells) {
-    if (bytes.size() < sizeof(PaperPageHeader)) return broken(0, "page is shorter than its header");
+    if (bytes.size() < sizeof(PaperPageHeader)) return brokenPage(0, "page is shorter than its header");
     PaperPageView page;
     std::memcpy(&page.header, bytes.data(), sizeof(PaperPageHeader));
     VCP_TRY(checkHeader(page.header, bytes.size(), log2Cells));
     page.nodes = {reinterpret_cast<const int32_t*>(bytes.data() + sizeof(PaperPageHeader)), page.header.nodes};
     page.slices = {reinterpret_cast<const glm::u32vec4*>(bytes.data() + paperSections(page.header).slices),
                    page.header.slices};
-    VCP_TRY(NodeCheck(page).run());
+    VCP_TRY(PaperNodeCheck(page).run());
     return page;
 }
 

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <optional>
 
 #include <glm/common.hpp>
@@ -18,12 +17,10 @@ namespace vcp {
 
 namespace {
 
-constexpr float kNothing = std::numeric_limits<float>::infinity();
-
 /// What is kept of each pixel until the sky that its neighbours see is known.
 struct SkyPlanes {
     explicit SkyPlanes(size_t pixels)
-        : depth(pixels, kNothing), normals(pixels), albedo(pixels), sun(pixels), sky(pixels), hits(pixels) {}
+        : depth(pixels, kNoDepth), normals(pixels), albedo(pixels), sun(pixels), sky(pixels), hits(pixels) {}
 
     std::vector<float> depth;  // finest cells
     std::vector<glm::vec3> normals;
@@ -31,8 +28,6 @@ struct SkyPlanes {
     std::vector<uint8_t> sun, sky;
     std::vector<HostHit> hits;
 };
-
-uint8_t toByte(float x) { return uint8_t(std::lround(255 * x)); }
 
 class LayerDrawing {
 public:
@@ -60,7 +55,7 @@ private:
     template <class Visit>
     void forEachHit(const TileHits& hits, const Visit& visit) const {
         forEachPixel(picture_.size, hits.corner, [&](glm::ivec2 pixel, int i) {
-            if (hits.depth[i] < kNothing) visit(pixel, i);
+            if (hits.depth[i] < kNoDepth) visit(pixel, i);
         });
     }
 
@@ -106,7 +101,7 @@ private:
     void castSun(const TileHits& hits, TileSurface& surface, uint32_t number) const {
         const glm::vec3 light(lightNumbered(frame_, number));
         const auto darken = [&, bits = bitsOfLight(frame_, number)](int i) {
-            surface.sun[i] = float(toByte(surface.sun[i]) & ~bits) / 255;
+            surface.sun[i] = float(unormByte(surface.sun[i]) & ~bits) / 255;
         };
         LightRay rays[kTilePixels];
         int pixels[kTilePixels];
@@ -119,7 +114,7 @@ private:
         float distances[kTilePixels];
         castLightRays(layer_.scene, {rays, count}, distances, tiles_.lightMarks());
         for (size_t k = 0; k < count; ++k)
-            if (distances[k] < kNothing) darken(pixels[k]);
+            if (distances[k] < kNoDepth) darken(pixels[k]);
     }
 
     void castSky(const TileHits& hits, TileSurface& surface) const {
@@ -161,8 +156,8 @@ private:
             planes_->depth[to] = tiles_.depthInCells(hits.depth[i]);
             planes_->normals[to] = surface.normal(i);
             if (tiles_.isColoured()) planes_->albedo[to] = tiles_.colourOf(colours, hits, pixel, i);
-            planes_->sun[to] = toByte(surface.sun[i]);
-            planes_->sky[to] = toByte(surface.sky[i]);
+            planes_->sun[to] = unormByte(surface.sun[i]);
+            planes_->sky[to] = unormByte(surface.sky[i]);
             planes_->hits[to] = tiles_.hitOf(hits, i);
         });
     }
@@ -172,10 +167,10 @@ private:
         tiles_.setClay(surface);
         TileHits hits;
         hits.corner = corner;
-        std::fill_n(hits.depth, kTilePixels, kNothing);
+        std::fill_n(hits.depth, kTilePixels, kNoDepth);
         forEachPixel(picture_.size, corner, [&](glm::ivec2 pixel, int i) {
             const size_t from = at(pixel);
-            if (!(planes_->depth[from] < kNothing)) return;
+            if (!(planes_->depth[from] < kNoDepth)) return;
             hits.any = true;
             hits.depth[i] = float(double(planes_->depth[from]) * layer_.scene.grid().cell);
             const glm::vec3 normal = planes_->normals[from];
@@ -219,7 +214,7 @@ private:
 HostPicture::HostPicture(glm::ivec2 pictureSize, std::span<const uint32_t> background)
     : size(pictureSize),
       colours(size_t(size.x) * size_t(size.y)),
-      depth(colours.size(), kNothing),
+      depth(colours.size(), kNoDepth),
       normals(colours.size(), glm::vec3(0)),
       hits(colours.size()) {
     for (size_t y = 0; y < size_t(size.y); ++y)

@@ -2,6 +2,8 @@
 // there. Any thread, but for the constructor.
 #pragma once
 
+#include <cmath>
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -24,6 +26,9 @@ void forEachPixel(glm::ivec2 size, glm::ivec2 corner, const Visit& visit) {
     for (int y = 0; y < part.y; ++y)
         for (int x = 0; x < part.x; ++x) visit(corner + glm::ivec2(x, y), y * kTileWidth + x);
 }
+
+/// Returns a part of 0 to 1 as 0 to 255.
+inline uint8_t unormByte(float part) { return uint8_t(std::lround(255 * part)); }
 
 void setAlbedo(TileSurface& surface, int i, glm::vec4 colour);
 

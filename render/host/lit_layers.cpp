@@ -4,7 +4,6 @@
 #include <atomic>
 #include <cmath>
 #include <functional>
-#include <limits>
 #include <memory>
 
 #include <glm/common.hpp>
@@ -18,11 +17,8 @@ namespace vcp {
 
 namespace {
 
-constexpr float kNothing = std::numeric_limits<float>::infinity();
 // Occlusion rays of so many numbers are cast side by side: they meet the same leaves.
 constexpr uint32_t kAtOnce = 8;
-
-uint8_t toByte(float x) { return uint8_t(std::lround(255 * x)); }
 
 /// A layer, and what takes rays of the world into it.
 struct Lit {
@@ -161,7 +157,7 @@ private:
         forEachPixel(picture_.size, corner, [&](glm::ivec2 pixel, int) {
             const size_t from = at(pixel);
             const bool onSurface = picture_.hits[from].dataset == HostHit::kOnSurface;
-            if (picture_.depth[from] < kNothing && (onSurface || !lit_.empty()))
+            if (picture_.depth[from] < kNoDepth && (onSurface || !lit_.empty()))
                 tile.pixels[tile.count++] = {pixel, from, picture_.normals[from], onSurface};
         });
         return tile;
@@ -198,7 +194,7 @@ private:
             }
             castLightRays(each->layer.scene, {rays, count}, distances, each->tiles.lightMarks());
             for (size_t k = 0; k < count; ++k)
-                if (distances[k] < kNothing) darken(*from[k]);
+                if (distances[k] < kNoDepth) darken(*from[k]);
         }
     }
 
@@ -242,7 +238,7 @@ private:
                 seen[i % tile.count] += near[i] < reach_ ? f32::skyBehind(near[i] / reach_) : 1.0f;
         }
         for (size_t k = 0; k < tile.count; ++k)
-            planes_.sky[tile.pixels[k].at] = toByte(seen[k] / float(frame_.occlusionRays));
+            planes_.sky[tile.pixels[k].at] = unormByte(seen[k] / float(frame_.occlusionRays));
     }
 
     /// Casts rays through a layer; those of one number, over the tile, are side by side. `near`: how far each comes,

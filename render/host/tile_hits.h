@@ -3,6 +3,7 @@
 
 #include <bitset>
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include <glm/vec2.hpp>
@@ -12,6 +13,9 @@
 #include "octree/page/strips.h"
 
 namespace vcp {
+
+/// The depth, or the distance along a ray, where nothing is hit.
+inline constexpr float kNoDepth = std::numeric_limits<float>::infinity();
 
 inline constexpr int kTileWidth = 16, kTileHeight = 8, kTilePixels = kTileWidth * kTileHeight;
 

@@ -1,21 +1,14 @@
 #include "render/pages/scene_residency.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cstring>
 #include <utility>
 
 #include <fmt/format.h>
 
+#include "streaming/steady_seconds.h"
+
 namespace vcp {
-
-namespace {
-
-double steadySeconds() {
-    return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
-
-}  // namespace
 
 Result<std::shared_ptr<SceneResidency>> SceneResidency::create(const PageMemorySource& memory,
                                                                const ResidencyOptions& options,

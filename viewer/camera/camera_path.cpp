@@ -18,7 +18,7 @@ namespace {
 
 constexpr size_t kMostCameras = 10000;
 constexpr size_t kLargestFile = 64 << 20;
-constexpr int kDeepest = 4;  // a camera's coordinates are nested 3 deep
+constexpr int kDeepestCamera = 4;  // a camera's coordinates are nested 3 deep
 
 /// Returns the weights of four keys in a row, for a time from 0 to 1 between the middle two.
 std::array<double, 4> catmullRomWeights(double t) {
@@ -106,7 +106,9 @@ std::vector<OrbitCamera> cameraPath(std::span<const OrbitCamera> keys, int count
 }
 
 Result<std::vector<OrbitCamera>> camerasFromJson(std::string_view text, const std::string& name) {
-    const auto isShallow = [](int depth, nlohmann::json::parse_event_t, nlohmann::json&) { return depth <= kDeepest; };
+    const auto isShallow = [](int depth, nlohmann::json::parse_event_t, nlohmann::json&) {
+        return depth <= kDeepestCamera;
+    };
     const auto json = nlohmann::json::parse(text, isShallow, false);
     if (!json.is_array() || json.empty() || json.size() > kMostCameras)
         return Error{.code = ErrorCode::InvalidInput,

@@ -10,7 +10,7 @@ namespace {
 
 using Json = nlohmann::json;
 
-constexpr int kDeepest = 16;
+constexpr int kDeepestRead = 16;
 // How deep the values of a scene or a path of cameras nest: deeper ones have no line of their own.
 constexpr int kDeepestLine = 5;
 constexpr size_t kLongestKey = 64, kMostItems = 1024;
@@ -42,7 +42,7 @@ void LinesOf::value(const std::string& pointer, int depth, bool keep) {
     skipSpace();
     if (keep) lines_.emplace(pointer, line_);
     // What nests deeper is no scene: the rest of the text has no lines.
-    if (depth > kDeepest) at_ = text_.size();
+    if (depth > kDeepestRead) at_ = text_.size();
     if (at_ >= text_.size()) return;
     if (text_[at_] == '"') {
         string();

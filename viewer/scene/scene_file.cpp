@@ -26,7 +26,7 @@ using Json = nlohmann::json;
 
 constexpr size_t kLargestFile = 1 << 20;
 constexpr size_t kMostSurfaces = 64;
-constexpr int kDeepest = 16;
+constexpr int kDeepestScene = 16;
 constexpr int kMostSteps = 4096;                             // of relief mapping
 constexpr double kSmallestCell = 0.25, kLargestCell = 1000;  // pixels, of remeshing
 // Within this range double precision resolves a millimetre where units are metres, and more.
@@ -477,7 +477,7 @@ auto readJson(std::string_view text, const std::string& name, const std::filesys
     -> Result<std::invoke_result_t<Read, SceneReader&, const Json&>> {
     if (auto error = notJson(text, name)) return *std::move(error);
     const Json json = Json::parse(text);
-    if (isDeeperThan(json, kDeepest))
+    if (isDeeperThan(json, kDeepestScene))
         return Error{.code = ErrorCode::InvalidInput, .message = "not a scene: nested too deeply", .file = name};
     const LinesOf lines(text);
     if (lines.twice()) {

@@ -17,6 +17,7 @@
 #include "builder/stream/chunk_room.h"
 #include "builder/stream/colour_encoding.h"
 #include "builder/stream/data_uri.h"
+#include "builder/stream/number_text.h"
 #include "octree/surface/leaf_math.h"
 
 namespace vcp {
@@ -353,7 +354,7 @@ private:
 }  // namespace
 
 bool looksLikeGltf(std::string_view start) {
-    if (start.starts_with("\xEF\xBB\xBF")) start.remove_prefix(3);
+    if (start.starts_with(kUtf8Mark)) start.remove_prefix(kUtf8Mark.size());
     start.remove_prefix(std::min(start.find_first_not_of(" \t\r\n"), start.size()));
     return start.starts_with(kGlbMark) || start.starts_with('{');
 }
