@@ -145,14 +145,14 @@ private:
 };
 
 /// A mesh with a colour at each vertex.
-struct Painted {
+struct PaintedMesh {
     IndexedMesh mesh;
     std::vector<uint32_t> colours;
 };
 
 /// Squares of black and white in turn that share no vertices, so that each keeps its colour to its border.
-Painted checkerboard(int squares, double edge) {
-    Painted made;
+PaintedMesh checkerboard(int squares, double edge) {
+    PaintedMesh made;
     for (int y = 0; y < squares; ++y)
         for (int x = 0; x < squares; ++x) {
             const auto first = uint32_t(made.mesh.positions.size());
@@ -168,7 +168,7 @@ Painted checkerboard(int squares, double edge) {
 
 class ColourLevels : public ::testing::Test {
 protected:
-    void build(const Painted& painted, double cell, const std::string& name = "out.vcp") {
+    void build(const PaintedMesh& painted, double cell, const std::string& name = "out.vcp") {
         test::writePly(painted.mesh, folder_ / "mesh.ply", painted.colours);
         BuildOptions o;
         o.inputs = {folder_ / "mesh.ply"};
@@ -213,7 +213,7 @@ protected:
 };
 
 TEST_F(ColourLevels, ACheckerboardKeepsItsLight) {
-    Painted board = checkerboard(160, 1);
+    PaintedMesh board = checkerboard(160, 1);
     test::rotate(board.mesh, {0, 0, 0}, glm::normalize(glm::dvec3(3, 2, 1)), 0.4);
     build(board, 0.8);
     const Shown shown(folder_ / "out.vcp", 6);
@@ -233,7 +233,7 @@ TEST_F(ColourLevels, SurfacesOfAnyColourKeepTheirLight) {
     std::mt19937 random(5);
     for (const uint32_t rings : {12u, 60u}) {  // triangles of several cells, and some of half a cell
         SCOPED_TRACE(rings);
-        Painted ball{test::sphereMesh({0, 0, 0}, 10, rings), {}};
+        PaintedMesh ball{test::sphereMesh({0, 0, 0}, 10, rings), {}};
         for (size_t v = 0; v < ball.mesh.positions.size(); ++v) ball.colours.push_back(uint32_t(random()));
         build(ball, 0.12);
         EXPECT_GE(levelsOf(compare(Shown(folder_ / "out.vcp", 3))), 3u);

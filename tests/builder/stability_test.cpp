@@ -19,7 +19,7 @@ struct Ray {
     glm::dvec3 origin, direction;
 };
 
-glm::dvec3 unitVector(std::mt19937_64& random) {
+glm::dvec3 randomDirection(std::mt19937_64& random) {
     std::normal_distribution<double> normal;
     return glm::normalize(glm::dvec3(normal(random), normal(random), normal(random)));
 }
@@ -39,7 +39,7 @@ std::vector<Ray> raysAt(const Built& built, size_t count, uint64_t seed) {
         const auto t = mesh.corners(random() % mesh.triangles.size());
         const double u = unit(random), v = unit(random) * (1 - u);
         glm::dvec3 target = t[0] + u * (t[1] - t[0]) + v * (t[2] - t[0]);
-        glm::dvec3 direction = unitVector(random);
+        glm::dvec3 direction = randomDirection(random);
         switch (rays.size() % 6) {
             case 0:
                 break;
@@ -66,7 +66,7 @@ std::vector<Ray> raysAt(const Built& built, size_t count, uint64_t seed) {
                 break;
             }
             default:
-                target += radius * 0.3 * unitVector(random);
+                target += radius * 0.3 * randomDirection(random);
         }
         rays.push_back({target - 3.0 * radius * direction, direction});
     }
@@ -166,7 +166,8 @@ TEST(Stability, NeedlesOnTheirOwn) {
     IndexedMesh mesh;
     std::mt19937_64 random(2);
     for (uint32_t i = 0; i < 12; ++i) {
-        const glm::dvec3 along = unitVector(random), across = glm::normalize(glm::cross(along, unitVector(random)));
+        const glm::dvec3 along = randomDirection(random),
+                         across = glm::normalize(glm::cross(along, randomDirection(random)));
         for (const glm::dvec3 p : {glm::dvec3(0), along, along + 3e-6 * across}) mesh.positions.push_back(p);
         mesh.triangles.push_back({3 * i, 3 * i + 1, 3 * i + 2});
     }
@@ -179,8 +180,8 @@ TEST(Stability, NeedlesThinnerThanTheLattice) {
     std::mt19937_64 random(3);
     std::uniform_real_distribution<double> unit(0, 1);
     for (uint32_t i = 0; i < 24; ++i) {
-        const glm::dvec3 from(unit(random), unit(random), unit(random)), across = unitVector(random);
-        const glm::dvec3 along = i < 16 ? unitVector(random) : 3e-7 * unitVector(random);
+        const glm::dvec3 from(unit(random), unit(random), unit(random)), across = randomDirection(random);
+        const glm::dvec3 along = i < 16 ? randomDirection(random) : 3e-7 * randomDirection(random);
         for (const glm::dvec3 p : {from, from + along, from + (i % 2 ? 0.4 : 0.0) * along + 3e-7 * across})
             mesh.positions.push_back(p);
         mesh.triangles.push_back({3 * i, 3 * i + 1, 3 * i + 2});

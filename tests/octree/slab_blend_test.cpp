@@ -52,9 +52,9 @@ private:
     ReferenceCaster plain_, blended_;
 };
 
-class Dice {
+class RandomRays {
 public:
-    explicit Dice(uint64_t seed) : random_(seed) {}
+    explicit RandomRays(uint64_t seed) : random_(seed) {}
     double between(double a, double b) { return std::uniform_real_distribution<double>(a, b)(random_); }
     glm::dvec3 direction() {
         std::normal_distribution<double> normal;
@@ -75,7 +75,7 @@ double quantile(std::vector<double> values, double part) {
 }
 
 TEST(SlabBlend, WeightsAreThoseOfTheEightOctants) {
-    Dice dice(1);
+    RandomRays dice(1);
     for (int i = 0; i < 1000; ++i) {
         const glm::dvec3 x(dice.between(0, 1), dice.between(0, 1), dice.between(0, 1));
         const glm::dvec3 corner = f64::nearestCorner(x);
@@ -108,7 +108,7 @@ TEST(SlabBlend, CountsFromOnePixelOnAndWhollyFromTwo) {
 }
 
 TEST(SlabBlend, APlaneOfAnyOrientationKeepsItsNormal) {
-    Dice dice(2);
+    RandomRays dice(2);
     for (int i = 0; i < 20; ++i) {
         const glm::dvec3 normal = dice.direction();
         const PageCache cache = slabsOf(test::plane(normal, glm::dot(normal, glm::dvec3(15.7, 16.1, 15.9))));
@@ -132,7 +132,7 @@ TEST(SlabBlend, NormalsOfASphereAreNearerToTheTruth) {
     const glm::dvec3 centre(16.1, 15.8, 16.3);
     const double radius = 12.3;
     const PageCache cache = slabsOf(test::sphere(centre, radius));
-    Dice dice(3);
+    RandomRays dice(3);
     for (const uint32_t level : {0u, 1u}) {
         const Pair pair(cache, level);
         std::vector<double> plain, blended;
@@ -164,7 +164,7 @@ TEST(SlabBlend, AFoldIsNotSmeared) {
             return one.distance < other.distance ? one : other;
         });
         const Pair pair(cache, 1);
-        Dice dice(4);
+        RandomRays dice(4);
         std::vector<double> plain, blended;
         // From within one sphere towards the gap.
         while (blended.size() < 5000) {
@@ -190,7 +190,7 @@ TEST(SlabBlend, LeavesAsNarrowAsAPixelKeepTheirNormals) {
     const glm::dvec3 centre(16.1, 15.8, 16.3);
     const PageCache cache = slabsOf(test::sphere(centre, 12.3));
     const Pair narrow(cache, 1, 1.0), wide(cache, 1, 0.99);
-    Dice dice(5);
+    RandomRays dice(5);
     double most = 0;
     for (int i = 0; i < 2000; ++i) {
         const glm::dvec3 out = dice.direction();

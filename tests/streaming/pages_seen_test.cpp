@@ -14,8 +14,6 @@
 namespace vcp {
 namespace {
 
-constexpr uint64_t kChunkBytes = 64 * kPoolUnitBytes;
-
 /// Mixes three numbers (SplitMix64).
 uint64_t mixed(uint64_t a, uint64_t b, uint64_t c) {
     uint64_t x = a * 0x9e3779b97f4a7c15 + b * 0xd1342543de82ef95 + c;
@@ -140,14 +138,14 @@ std::vector<std::optional<RayEnd>> picture(const World& world, const SelectionVi
 }
 
 /// The policy with reads that end in any order, and frames that are drawn now and then.
-class Flight {
+class WorldFlight {
 public:
-    Flight(const World& world, uint64_t budgetBytes, uint64_t seed, bool hiddenToo = false)
+    WorldFlight(const World& world, uint64_t budgetBytes, uint64_t seed, bool hiddenToo = false)
         : world_(world),
           random_(seed),
           pooled_{world.dataset, world.dataset->hasColour()},
-          policy({&pooled_, 1}, poolShapeFor({&pooled_, 1}, budgetBytes, kChunkBytes), LoadOrder::Feedback, hiddenToo) {
-    }
+          policy({&pooled_, 1}, poolShapeFor({&pooled_, 1}, budgetBytes, test::kChunkBytes), LoadOrder::Feedback,
+                 hiddenToo) {}
 
     /// One round; true when the view has settled.
     bool round(const SelectionView& view, uint64_t most) {
@@ -207,12 +205,12 @@ TEST(PagesSeen, AnyOrderComesToTheLeastPagesThatAreEnough) {
         const SelectionView view = world.view();
         const std::set<uint64_t> least = leastPages(world, view);
         for (uint64_t order = 0; order < 4; ++order) {
-            Flight run(world, kEnough, 10 * seed + order);
+            WorldFlight run(world, kEnough, 10 * seed + order);
             run.settle(view);
             EXPECT_EQ(run.resident(), least);
             EXPECT_EQ(world.castAll(view, run.outcome.cuts[0]), picture(world, view));
         }
-        Flight all(world, kEnough, seed, true);
+        WorldFlight all(world, kEnough, seed, true);
         all.settle(view);
         read += least.size();
         inView += all.resident().size();
@@ -225,7 +223,7 @@ TEST(PagesSeen, APictureDoesNotDependOnWhatCameBefore) {
         SCOPED_TRACE(seed);
         const World world(seed);
         const SelectionView view = world.view();
-        Flight wild(world, kEnough, seed);
+        WorldFlight wild(world, kEnough, seed);
         for (int i = 0; i < 30; ++i)
             wild.round(world.view(0.05 + 0.1 * (i % 4), {-2, 0.01 * i, 0.3}), 1 + uint64_t(i) % 9);
         wild.settle(view);
@@ -244,7 +242,7 @@ TEST(PagesSeen, NorDoesItWhereTheBudgetIsTooSmall) {
         for (const uint64_t part : {4, 8, 11, 15}) {
             SCOPED_TRACE(std::to_string(seed) + ", " + std::to_string(part));
             const uint64_t budget = least * kPoolUnitBytes * part / 10;
-            Flight plain(world, budget, 1);
+            WorldFlight plain(world, budget, 1);
             if (!plain.policy.hasRoom()) continue;
             plain.settle(view);
             const auto expected = world.castAll(view, plain.outcome.cuts[0]);
@@ -254,7 +252,7 @@ TEST(PagesSeen, NorDoesItWhereTheBudgetIsTooSmall) {
             }
             relaxed += plain.outcome.cuts[0].isRelaxed ? 1 : 0;
             for (uint64_t history = 0; history < 3; ++history) {
-                Flight wild(world, budget, seed + 100 * history);
+                WorldFlight wild(world, budget, seed + 100 * history);
                 for (int i = 0; i < 20; ++i) wild.round(world.view(0.1, {-2, 0.01 * i, 0.3}), 5);
                 wild.settle(view);
                 EXPECT_EQ(world.castAll(view, wild.outcome.cuts[0]), expected);
@@ -271,12 +269,12 @@ TEST(PagesSeen, NobodyIsAskedWhereAllTakesFewBytes) {
         SCOPED_TRACE(seed);
         const World world(seed);
         SelectionView view = world.view();
-        Flight all(world, kEnough, seed, true);
+        WorldFlight all(world, kEnough, seed, true);
         all.settle(view);
         const double bytes = double(all.policy.unitsTaken() * kPoolUnitBytes);
         for (const bool areFew : {true, false}) {
             view.pixels = bytes / kFewBytesAPixel * (areFew ? 1.01 : 0.99);
-            Flight flight(world, kEnough, seed);
+            WorldFlight flight(world, kEnough, seed);
             flight.settle(view);
             EXPECT_EQ(flight.resident() == all.resident(), areFew);
         }
@@ -286,7 +284,7 @@ TEST(PagesSeen, NobodyIsAskedWhereAllTakesFewBytes) {
 TEST(PagesSeen, RaysOfLightCountOnceTheCamerasAreFinal) {
     const World world(3);
     const SelectionView view = world.view();
-    Flight run(world, kEnough, 1);
+    WorldFlight run(world, kEnough, 1);
     run.settle(view);
     const std::set<uint64_t> before = run.resident();
     uint64_t hidden = 0;
@@ -307,7 +305,7 @@ TEST(PagesSeen, AShakingViewLoadsHardlyMore) {
     for (uint64_t seed = 0; seed < 8; ++seed) {
         const World world(seed);
         const SelectionView views[] = {world.view(0.12, {-2, 0.4, 0.3}), world.view(0.12, {-2, 0.401, 0.3})};
-        Flight run(world, kEnough, seed);
+        WorldFlight run(world, kEnough, seed);
         run.settle(views[0]);
         run.settle(views[1]);
         still += run.policy.counts().loads;

@@ -13,8 +13,6 @@
 namespace vcp {
 namespace {
 
-constexpr uint64_t kChunkBytes = 64 * kPoolUnitBytes;
-
 constexpr double kFrameSeconds = 1.0 / 60;
 
 struct Conditions {
@@ -24,7 +22,7 @@ struct Conditions {
     uint64_t seed = 0;       // order of arrival
     size_t perRound = 3;     // pages that arrive
     LoadOrder order = LoadOrder::Feedback;
-    uint64_t chunkBytes = kChunkBytes;
+    uint64_t chunkBytes = test::kChunkBytes;
 };
 
 /// A pool that remembers which page's bytes are in each unit, a queue, and reads that end in any order.
@@ -467,7 +465,7 @@ TEST(ResidencyPolicy, WhatJustCameStaysForAWhileInSeconds) {
     const auto dataset = std::make_shared<const Dataset>(test::randomTree(1, 4, 0.9, 16384));
     const uint64_t budget = allBytes(*dataset) / 3;
     const PooledDataset pooled{dataset, dataset->hasColour()};
-    ResidencyPolicy policy({&pooled, 1}, poolShapeFor({&pooled, 1}, budget, kChunkBytes));
+    ResidencyPolicy policy({&pooled, 1}, poolShapeFor({&pooled, 1}, budget, test::kChunkBytes));
     SelectionView views[2];
     for (int i = 0; i < 2; ++i) {
         views[i].eye = {0.5, 0.4, 0.6};

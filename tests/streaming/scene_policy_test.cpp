@@ -15,8 +15,6 @@
 namespace vcp {
 namespace {
 
-constexpr uint64_t kChunkBytes = 64 * kPoolUnitBytes;
-
 using Views = std::vector<std::optional<SelectionView>>;
 
 struct Datasets {
@@ -133,7 +131,7 @@ class Flight {
 public:
     Flight(const Datasets& datasets, uint64_t budgetBytes, uint64_t seed)
         : datasets_(datasets),
-          shape_(poolShapeFor(datasets.pooled, budgetBytes, kChunkBytes)),
+          shape_(poolShapeFor(datasets.pooled, budgetBytes, test::kChunkBytes)),
           random_(seed),
           policy(datasets.pooled, shape_) {}
 

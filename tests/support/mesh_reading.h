@@ -1,6 +1,7 @@
 // Reads whole small meshes for the tests of the mesh readers.
 #pragma once
 
+#include <filesystem>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -13,6 +14,9 @@
 #include "tests/support/piped_bytes.h"
 
 namespace vcp::test {
+
+/// The folder of models that are not part of the repository; it need not be there.
+inline const std::filesystem::path kSharedData = VCP_SHARED_DATA_DIR;
 
 using Triangle = std::array<uint64_t, 3>;
 

@@ -8,8 +8,12 @@
 #include <vector>
 
 #include "streaming/page_selection.h"
+#include "streaming/slot_allocator.h"
 
 namespace vcp::test {
+
+/// Bytes of a chunk of a small pool.
+inline constexpr uint64_t kChunkBytes = 64 * kPoolUnitBytes;
 
 /// What a view sees where there is one dataset.
 inline std::array<std::optional<SelectionView>, 1> only(const SelectionView& view) { return {view}; }

@@ -18,7 +18,7 @@ namespace {
 using Positions = std::vector<glm::i32vec3>;
 using Triangles = std::vector<std::array<uint32_t, 3>>;
 
-LatticeTriangle triangle(glm::i32vec3 a, glm::i32vec3 b, glm::i32vec3 c, float stray = 0.5f) {
+LatticeTriangle latticeTriangle(glm::i32vec3 a, glm::i32vec3 b, glm::i32vec3 c, float stray = 0.5f) {
     LatticeTriangle t{};
     t.corner[0] = a;
     t.corner[1] = b;
@@ -35,8 +35,9 @@ LatticeTriangle coloured(LatticeTriangle t, uint32_t a, uint32_t b, uint32_t c) 
 }
 
 TEST(MeshOf, MergesEqualPositions) {
-    const LatticeMesh mesh = meshOf(
-        std::vector{triangle({0, 0, 0}, {9, 0, 0}, {0, 9, 0}, 1), triangle({9, 0, 0}, {9, 9, 0}, {0, 9, 0}, 4)}, false);
+    const LatticeMesh mesh = meshOf(std::vector{latticeTriangle({0, 0, 0}, {9, 0, 0}, {0, 9, 0}, 1),
+                                                latticeTriangle({9, 0, 0}, {9, 9, 0}, {0, 9, 0}, 4)},
+                                    false);
     // One cell: by z, y, x.
     EXPECT_EQ(mesh.positions, (Positions{{0, 0, 0}, {9, 0, 0}, {0, 9, 0}, {9, 9, 0}}));
     EXPECT_EQ(mesh.triangles, (Triangles{{0, 1, 2}, {1, 3, 2}}));
@@ -46,8 +47,8 @@ TEST(MeshOf, MergesEqualPositions) {
 
 TEST(MeshOf, VerticesFollowTheMortonCurve) {
     constexpr int32_t cell = kLatticePerCell;
-    const LatticeMesh mesh = meshOf(std::vector{triangle({0, 0, cell}, {cell, 0, 0}, {0, cell - 1, 0}),
-                                                triangle({0, 2 * cell, 0}, {cell, 1, 0}, {5, 5, 5})},
+    const LatticeMesh mesh = meshOf(std::vector{latticeTriangle({0, 0, cell}, {cell, 0, 0}, {0, cell - 1, 0}),
+                                                latticeTriangle({0, 2 * cell, 0}, {cell, 1, 0}, {5, 5, 5})},
                                     false);
     EXPECT_EQ(mesh.positions,
               (Positions{{0, cell - 1, 0}, {5, 5, 5}, {cell, 0, 0}, {cell, 1, 0}, {0, 0, cell}, {0, 2 * cell, 0}}));
@@ -56,8 +57,8 @@ TEST(MeshOf, VerticesFollowTheMortonCurve) {
 
 TEST(MeshOf, OneOfTheRepeatedStaysWithTheLargestStray) {
     const glm::i32vec3 a{0, 0, 0}, b{9, 0, 0}, c{0, 9, 0};
-    const std::vector<LatticeTriangle> copies{triangle(c, b, a, 1), triangle(a, b, c, 2), triangle(b, c, a, 5),
-                                              triangle(b, a, c, 3)};
+    const std::vector<LatticeTriangle> copies{latticeTriangle(c, b, a, 1), latticeTriangle(a, b, c, 2),
+                                              latticeTriangle(b, c, a, 5), latticeTriangle(b, a, c, 3)};
     // The orientation that ascends is kept, whichever comes first.
     for (size_t first = 0; first < copies.size(); ++first) {
         std::vector<LatticeTriangle> soup = copies;
@@ -66,14 +67,14 @@ TEST(MeshOf, OneOfTheRepeatedStaysWithTheLargestStray) {
         EXPECT_EQ(mesh.triangles, (Triangles{{0, 1, 2}}));
         EXPECT_EQ(mesh.stray, (std::vector<float>{5}));
     }
-    EXPECT_EQ(meshOf(std::vector{triangle(c, b, a)}, false).triangles, (Triangles{{0, 2, 1}}));
+    EXPECT_EQ(meshOf(std::vector{latticeTriangle(c, b, a)}, false).triangles, (Triangles{{0, 2, 1}}));
 }
 
 TEST(MeshOf, ColoursAreMeansOverTheTriangles) {
     const glm::i32vec3 a{0, 0, 0}, b{9, 0, 0}, c{0, 9, 0}, d{9, 9, 0};
-    const std::vector<LatticeTriangle> soup{coloured(triangle(a, b, c), 0xff000001u, 0xff102030u, 0),
-                                            coloured(triangle(b, d, c), 0xff122131u, 7, 0),
-                                            coloured(triangle(d, a, c), 9, 0x00000004u, 3)};
+    const std::vector<LatticeTriangle> soup{coloured(latticeTriangle(a, b, c), 0xff000001u, 0xff102030u, 0),
+                                            coloured(latticeTriangle(b, d, c), 0xff122131u, 7, 0),
+                                            coloured(latticeTriangle(d, a, c), 9, 0x00000004u, 3)};
     const LatticeMesh mesh = meshOf(soup, true);
     // Halves are rounded up.
     EXPECT_EQ(mesh.colours, (std::vector<uint32_t>{0x80000003u, 0xff112131u, 1, 8}));
@@ -81,7 +82,8 @@ TEST(MeshOf, ColoursAreMeansOverTheTriangles) {
 
 TEST(MeshOf, OwnNormalsStayWithTheirCorners) {
     const glm::i32vec3 a{0, 0, 0}, b{9, 0, 0}, c{0, 9, 0}, d{9, 9, 0};
-    LatticeTriangle first = triangle(c, a, b), second = triangle(b, d, c), turned = triangle(a, c, b);
+    LatticeTriangle first = latticeTriangle(c, a, b), second = latticeTriangle(b, d, c),
+                    turned = latticeTriangle(a, c, b);
     std::copy_n(std::array<uint32_t, 3>{30, 10, 20}.begin(), 3, first.own);
     std::copy_n(std::array<uint32_t, 3>{10, 31, 20}.begin(), 3, turned.own);
     const uint32_t none = kUnknownNormal;
@@ -90,7 +92,7 @@ TEST(MeshOf, OwnNormalsStayWithTheirCorners) {
         std::rotate(soup.begin(), soup.begin() + 1, soup.end());
         LatticeMesh mesh = meshOf(soup, false);
         ASSERT_EQ(mesh.triangles, (Triangles{{0, 1, 2}, {1, 3, 2}}));
-        // Of the triangle that is there twice, the least.
+        // Of the latticeTriangle that is there twice, the least.
         EXPECT_EQ(mesh.cornerNormals, (std::vector<std::array<uint32_t, 3>>{{10, 20, 30}, {none, none, none}}));
         mesh.normals = {1, 5, 7, 9};
         EXPECT_EQ(mesh.normalOf(0, 2), 30u);
@@ -102,8 +104,8 @@ TEST(MeshOf, OwnNormalsStayWithTheirCorners) {
 TEST(SettleNormals, KeepsWhatIsTwoDegreesFromTheComputed) {
     // A roof of two slopes, whose ridge is a crease, and a flat beside it.
     const glm::i32vec3 p[] = {{0, 0, 0}, {900, 0, 900}, {0, 900, 0}, {1800, 0, 0}, {900, 900, 900}};
-    const std::vector<LatticeTriangle> soup{triangle(p[0], p[1], p[2]), triangle(p[1], p[4], p[2]),
-                                            triangle(p[1], p[3], p[4])};
+    const std::vector<LatticeTriangle> soup{latticeTriangle(p[0], p[1], p[2]), latticeTriangle(p[1], p[4], p[2]),
+                                            latticeTriangle(p[1], p[3], p[4])};
     const auto leaning = [](double degrees) {
         const double a = glm::radians(45 + degrees);
         return packDirection({-std::sin(a), 0, std::cos(a)});
@@ -158,7 +160,7 @@ std::vector<LatticeTriangle> randomSoup(uint64_t seed) {
     const int side = seed % 2 ? 6 : 100000;
     while (soup.size() < 500) {
         const auto point = [&] { return glm::i32vec3(any(side), any(side), any(side)); };
-        LatticeTriangle t = triangle(point(), point(), point(), float(any(100)));
+        LatticeTriangle t = latticeTriangle(point(), point(), point(), float(any(100)));
         if (!soup.empty() && any(3) == 0) std::copy_n(soup[random() % soup.size()].corner, 3, t.corner);
         if (any(2)) std::swap(t.corner[0], t.corner[1]);
         if (hasArea(t.corner[0], t.corner[1], t.corner[2]))
@@ -167,10 +169,10 @@ std::vector<LatticeTriangle> randomSoup(uint64_t seed) {
     return soup;
 }
 
-using Corners = std::array<std::array<int, 3>, 3>;
+using SortedCorners = std::array<std::array<int, 3>, 3>;
 
-Corners sorted(glm::i32vec3 a, glm::i32vec3 b, glm::i32vec3 c) {
-    Corners key{{{a.x, a.y, a.z}, {b.x, b.y, b.z}, {c.x, c.y, c.z}}};
+SortedCorners sorted(glm::i32vec3 a, glm::i32vec3 b, glm::i32vec3 c) {
+    SortedCorners key{{{a.x, a.y, a.z}, {b.x, b.y, b.z}, {c.x, c.y, c.z}}};
     std::sort(key.begin(), key.end());
     return key;
 }
@@ -179,7 +181,7 @@ TEST(MeshOf, RandomAgainstMap) {
     for (uint64_t seed = 0; seed < 50; ++seed) {
         const std::vector<LatticeTriangle> soup = randomSoup(seed);
         const LatticeMesh mesh = meshOf(soup, false);
-        std::map<Corners, float> want;
+        std::map<SortedCorners, float> want;
         for (const LatticeTriangle& t : soup) {
             float& stray = want[sorted(t.corner[0], t.corner[1], t.corner[2])];
             stray = std::max(stray, t.stray);
@@ -284,7 +286,7 @@ TEST(ComputeNormals, OrientationDoesNotMatter) {
 }
 
 TEST(ComputeNormals, UnusedVerticesAndNeedlesAreFinite) {
-    LatticeMesh mesh = meshOf(std::vector{triangle({0, 0, 0}, {1 << 19, 0, 0}, {1 << 18, 1, 0})}, false);
+    LatticeMesh mesh = meshOf(std::vector{latticeTriangle({0, 0, 0}, {1 << 19, 0, 0}, {1 << 18, 1, 0})}, false);
     mesh.positions.push_back({1 << 20, 5, 5});
     computeNormals(mesh);
     ASSERT_EQ(mesh.normals.size(), 4u);

@@ -32,7 +32,7 @@ IndexedMesh randomSurface(uint64_t seed) {
 }
 
 /// Triangles between random points: all sizes, through each other, needles among them.
-IndexedMesh randomSoup(uint64_t seed) {
+IndexedMesh randomTriangles(uint64_t seed) {
     std::mt19937_64 random(seed);
     std::uniform_real_distribution<double> unit(0, 1);
     IndexedMesh mesh;
@@ -104,7 +104,7 @@ TEST(Coarsen, SurfacesStayWithinTheirStray) {
 
 TEST(Coarsen, SoupsStayWithinTheirStray) {
     for (uint64_t seed = 0; seed < 24; ++seed)
-        expectWithinStray(withoutStray(randomSoup(seed)), 5, "seed " + std::to_string(seed));
+        expectWithinStray(withoutStray(randomTriangles(seed)), 5, "seed " + std::to_string(seed));
 }
 
 TEST(Coarsen, StraysOfTheFinerMeshAreHandedOn) {
@@ -252,7 +252,7 @@ std::map<Shape, float> shapesOf(const LatticeMesh& mesh) {
 TEST(Coarsen, NumberingDoesNotMatter) {
     for (uint64_t seed = 0; seed < 12; ++seed) {
         std::mt19937_64 random(seed);
-        LatticeMesh mesh = withoutStray(seed % 2 ? randomSoup(seed) : randomSurface(seed));
+        LatticeMesh mesh = withoutStray(seed % 2 ? randomTriangles(seed) : randomSurface(seed));
         for (size_t v = 0; v < mesh.positions.size(); ++v) mesh.colours.push_back(uint32_t(random()));
         for (float& stray : mesh.stray) stray = float(random() % 100) / 1000;
         std::vector<uint32_t> vertex(mesh.positions.size()), triangle(mesh.triangles.size());

@@ -303,7 +303,7 @@ TEST(VertexStep, SaysThatAVertexIsMissing) {
 
 /// Corners, edge middles and points inside.
 template <class Visit>
-void forSamples(const LatticeMesh& mesh, const Visit& visit) {
+void forStraySamples(const LatticeMesh& mesh, const Visit& visit) {
     constexpr double weights[7][3] = {{1, 0, 0},     {0, 1, 0},         {0, 0, 1},        {0.5, 0.5, 0},
                                       {0, 0.5, 0.5}, {0.25, 0.25, 0.5}, {0.4, 0.35, 0.25}};
     for (size_t k = 0; k < mesh.triangles.size(); ++k)
@@ -323,7 +323,7 @@ TEST(LevelStep, StraysBoundTheDistanceBothWays) {
             levels.coarsen();
             const LatticeMesh coarse = meshOf(levels.all(), false);
             double most = 0, moved = 0;
-            forSamples(coarse, [&](glm::dvec3 p, double stray) {
+            forStraySamples(coarse, [&](glm::dvec3 p, double stray) {
                 const double distance = finest.nearestPoint(p * scale)->distance / scale;
                 most = std::max(most, stray);
                 moved = std::max(moved, distance);
@@ -334,7 +334,7 @@ TEST(LevelStep, StraysBoundTheDistanceBothWays) {
             EXPECT_LT(most, 20 * moved);
             const IndexedMesh coarseMesh = test::inCells(coarse);
             const MeshBvh bvh(coarseMesh);
-            forSamples(meshOf(test::soupOf(mesh), false), [&](glm::dvec3 p, double) {
+            forStraySamples(meshOf(test::soupOf(mesh), false), [&](glm::dvec3 p, double) {
                 ASSERT_LE(bvh.nearestPoint(p / scale)->distance, most + 1e-9)
                     << "seed " << seed << ", level " << levels.level();
             });

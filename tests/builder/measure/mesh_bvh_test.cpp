@@ -12,8 +12,6 @@
 namespace vcp {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
 struct RandomPoints {
     explicit RandomPoints(uint64_t seed) : random(seed) {}
     std::mt19937_64 random;

@@ -8,7 +8,7 @@
 namespace vcp {
 namespace {
 
-constexpr double kCell = 0.1;
+constexpr double kCellEdge = 0.1;
 constexpr double kError = 0.004;
 
 struct Rays {
@@ -22,7 +22,7 @@ struct Rays {
 TEST(RayClasses, EachOfTheSix) {
     const IndexedMesh mesh = test::boxMesh({-1, -1, -1}, {1, 1, 1}, 4);
     const MeshBvh bvh(mesh);
-    const RayJudge judge(bvh, kCell, kError);
+    const RayJudge judge(bvh, kCellEdge, kError);
     const glm::dvec3 o(0.1, 0.2, 5), d(0, 0, -1), aside(3, 0, 5);
     const auto hitAt = [](double t) { return SurfaceHit{t, {0, 0, 1}, kError}; };
 
@@ -85,7 +85,7 @@ TEST(RayClasses, ShrunkenSphereHasNoHoles) {
     const IndexedMesh shrunken = test::sphereMesh({0, 0, 0}, 1 - 0.9 * kError, 60);
     const IndexedMesh tooSmall = test::sphereMesh({0, 0, 0}, 1 - 10 * kError, 60);
     const MeshBvh bvh(mesh), shrunkenBvh(shrunken), tooSmallBvh(tooSmall);
-    const RayJudge judge(bvh, kCell, kError);
+    const RayJudge judge(bvh, kCellEdge, kError);
     Rays rays(1);
     int excused = 0, caught = 0, beyond = 0;
     for (int i = 0; i < 20000; ++i) {
@@ -112,7 +112,7 @@ TEST(RayClasses, ThinPlateSeenThroughIsAHole) {
     // Thinner than the certified error: parity would excuse it, the parallels do not.
     const IndexedMesh mesh = test::boxMesh({-1, -1, 0}, {1, 1, 0.3 * kError}, 4);
     const MeshBvh bvh(mesh);
-    const RayJudge judge(bvh, kCell, kError);
+    const RayJudge judge(bvh, kCellEdge, kError);
     Rays rays(2);
     for (int i = 0; i < 500; ++i) {
         const glm::dvec3 at(0.95 * (2 * rays.unit(rays.random) - 1), 0.95 * (2 * rays.unit(rays.random) - 1), 0);
@@ -131,7 +131,7 @@ TEST(RayClasses, OpenBorderMayRecede) {
     mesh.positions = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}};
     mesh.triangles = {{0, 1, 2}, {0, 2, 3}};
     const MeshBvh bvh(mesh);
-    const RayJudge judge(bvh, kCell, kError);
+    const RayJudge judge(bvh, kCellEdge, kError);
     for (const glm::dvec3 d : {glm::dvec3(0, 0, -1), glm::normalize(glm::dvec3(0.3, 0.4, -0.5))}) {
         EXPECT_FALSE(judge.judge(glm::dvec3(0.5 * kError, 0.5, 0) - 2.0 * d, d, {}).hole);
         EXPECT_TRUE(judge.judge(glm::dvec3(0.5, 0.5, 0) - 2.0 * d, d, {}).hole) << "on the diagonal";
@@ -151,17 +151,17 @@ TEST(RayClasses, PartsThatTouchMayRecede) {
     const glm::dvec3 d = glm::normalize(glm::dvec3(0.2, 0.1, -1));
     for (const double x : {1 - 0.5 * kError, 1.0, 1 + 0.5 * kError}) {
         const glm::dvec3 o = glm::dvec3(x, 0.5, 0) - 2.0 * d;
-        EXPECT_FALSE(RayJudge(apartBvh, kCell, kError).judge(o, d, {}).hole) << x;
-        EXPECT_TRUE(RayJudge(joinedBvh, kCell, kError).judge(o, d, {}).hole) << x;
+        EXPECT_FALSE(RayJudge(apartBvh, kCellEdge, kError).judge(o, d, {}).hole) << x;
+        EXPECT_TRUE(RayJudge(joinedBvh, kCellEdge, kError).judge(o, d, {}).hole) << x;
     }
     const glm::dvec3 inner = glm::dvec3(1 - 3 * kError, 0.5, 0) - 2.0 * d;
-    EXPECT_TRUE(RayJudge(apartBvh, kCell, kError).judge(inner, d, {}).hole);
+    EXPECT_TRUE(RayJudge(apartBvh, kCellEdge, kError).judge(inner, d, {}).hole);
 }
 
 TEST(RayClasses, HitBehindACrossingNearbyIsNoHole) {
     const IndexedMesh mesh = test::boxMesh({-1, -1, -1}, {1, 1, 1}, 4);
     const MeshBvh bvh(mesh);
-    const RayJudge judge(bvh, kCell, kError);
+    const RayJudge judge(bvh, kCellEdge, kError);
     const glm::dvec3 o(0.1, 0.2, 5), d(0, 0, -1);
     EXPECT_FALSE(judge.leaks(o, d, 4 + 0.9 * kError));
     EXPECT_TRUE(judge.leaks(o, d, 4 + 5 * kError));

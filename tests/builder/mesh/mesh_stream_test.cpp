@@ -17,8 +17,6 @@ namespace {
 using test::readAll;
 using test::ReadMesh;
 
-const std::filesystem::path kData = VCP_SHARED_DATA_DIR;
-
 class OpenMesh : public testing::Test {
 protected:
     OpenMesh() { std::filesystem::create_directories(folder_); }
@@ -164,7 +162,7 @@ uint64_t peakResidentBytes() {
 std::vector<std::filesystem::path> suiteMeshes() {
     std::vector<std::filesystem::path> meshes;
     std::error_code absent;
-    for (const auto& entry : std::filesystem::recursive_directory_iterator(kData / "suites", absent)) {
+    for (const auto& entry : std::filesystem::recursive_directory_iterator(test::kSharedData / "suites", absent)) {
         std::string extension = entry.path().extension().string();
         std::ranges::transform(extension, extension.begin(), [](unsigned char c) { return char(std::tolower(c)); });
         if (extension == ".ply" || extension == ".obj" || extension == ".stl") meshes.push_back(entry.path());
@@ -175,7 +173,7 @@ std::vector<std::filesystem::path> suiteMeshes() {
 
 TEST(MeshSuites, EveryFileIsReadOrRefusedInOneLine) {
     const auto meshes = suiteMeshes();
-    if (meshes.empty()) GTEST_SKIP() << "no mesh suites in " << kData;
+    if (meshes.empty()) GTEST_SKIP() << "no mesh suites in " << test::kSharedData;
     const uint64_t before = peakResidentBytes();
     size_t read = 0;
     for (const auto& path : meshes) {
@@ -223,9 +221,10 @@ TEST(MeshSuites, KnownFilesHaveTheirTriangles) {
         {"suites/trimesh/models/negative_indices.obj", 8, 12},
         {"suites/trimesh/models/polygonfaces.obj", 5, 3},
     };
-    if (!std::filesystem::exists(kData / "suites")) GTEST_SKIP() << "no mesh suites in " << kData;
+    if (!std::filesystem::exists(test::kSharedData / "suites"))
+        GTEST_SKIP() << "no mesh suites in " << test::kSharedData;
     for (const Known& k : known) {
-        const ReadMesh mesh = readAll(openMesh(kData / k.path));
+        const ReadMesh mesh = readAll(openMesh(test::kSharedData / k.path));
         ASSERT_FALSE(mesh.error) << mesh.line();
         EXPECT_EQ(mesh.positions.size(), k.vertices) << k.path;
         EXPECT_EQ(mesh.triangles.size(), k.triangles) << k.path;
@@ -233,9 +232,10 @@ TEST(MeshSuites, KnownFilesHaveTheirTriangles) {
 }
 
 TEST(MeshSuites, TextAndBinaryOfOneModelAgree) {
-    if (!std::filesystem::exists(kData / "suites")) GTEST_SKIP() << "no mesh suites in " << kData;
-    const ReadMesh text = readAll(openMesh(kData / "suites/assimp/STL/Spider_ascii.stl"));
-    const ReadMesh binary = readAll(openMesh(kData / "suites/assimp/STL/Spider_binary.stl"));
+    if (!std::filesystem::exists(test::kSharedData / "suites"))
+        GTEST_SKIP() << "no mesh suites in " << test::kSharedData;
+    const ReadMesh text = readAll(openMesh(test::kSharedData / "suites/assimp/STL/Spider_ascii.stl"));
+    const ReadMesh binary = readAll(openMesh(test::kSharedData / "suites/assimp/STL/Spider_binary.stl"));
     ASSERT_EQ(text.positions.size(), binary.positions.size());
     for (size_t i = 0; i < text.positions.size(); ++i)
         EXPECT_LT(glm::length(text.positions[i] - binary.positions[i]), 1e-3) << i;

@@ -46,14 +46,14 @@ protected:
     TestFolder folder_{"vcp_obj_materials"};
 };
 
-const std::string kSquare = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 0.25\n";
+const std::string kTexturedSquare = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 0.25\n";
 
 TEST_F(ObjMaterialFiles, TexturesComeWithCoordinatesFromTheTop) {
     write("a b.mtl",
           "# comment\nnewmtl wood\n  Kd 0.5 0.5 0.5\n  map_Kd -s 2 4 1 -o 0.5 0 0 -clamp on  my wood.png \nnewmtl "
           "plain\nKd 1 0 0\n");
     write("my wood.png", "never looked into");
-    const Painted mesh = read("mtllib a b.mtl\n" + kSquare +
+    const Painted mesh = read("mtllib a b.mtl\n" + kTexturedSquare +
                               "usemtl wood\nf 1/1 2/2 3/3 -1/-1\nusemtl plain\nf 1 2 3\nusemtl wood\nf 1/9 2/2 3//1\n");
     EXPECT_TRUE(mesh.active && mesh.warnings.empty()) << mesh.warnings.size();
     ASSERT_EQ(mesh.list.size(), 2u);
@@ -69,7 +69,7 @@ TEST_F(ObjMaterialFiles, TexturesComeWithCoordinatesFromTheTop) {
 }
 
 TEST_F(ObjMaterialFiles, PlainColoursCountWhereTheyDiffer) {
-    const std::string faces = kSquare + "usemtl a\nf 1 2 3\nusemtl b\nf 1 3 4\n";
+    const std::string faces = kTexturedSquare + "usemtl a\nf 1 2 3\nusemtl b\nf 1 3 4\n";
     write("one.mtl", "newmtl a\nKd 0.8 0.8 0.8\nnewmtl b\nKd 0.8 0.8 0.8\n");
     EXPECT_FALSE(read("mtllib one.mtl\n" + faces).active);
     write("two.mtl", "newmtl a\nKd 0.8 0.8 0.8\nnewmtl b\nKd 0 1 0\n");
@@ -83,7 +83,7 @@ TEST_F(ObjMaterialFiles, PlainColoursCountWhereTheyDiffer) {
 TEST_F(ObjMaterialFiles, WhatIsMissingIsAWarning) {
     write("m.mtl", "newmtl a\nmap_Kd missing.png\nnewmtl b\nmap_Kd ../outside.png\nnewmtl c\nKd 1 0 0\n");
     const Painted mesh =
-        read("mtllib no.mtl m.mtl ../m.mtl\n" + kSquare + "usemtl unknown\nf 1 2 3\nusemtl unknown\nf 1 2 3\n");
+        read("mtllib no.mtl m.mtl ../m.mtl\n" + kTexturedSquare + "usemtl unknown\nf 1 2 3\nusemtl unknown\nf 1 2 3\n");
     ASSERT_EQ(mesh.warnings.size(), 5u);
     EXPECT_NE(mesh.warnings[0].find("no.mtl: no such file"), std::string::npos);
     EXPECT_NE(mesh.warnings[1].find("missing.png' is missing"), std::string::npos);
@@ -96,7 +96,7 @@ TEST_F(ObjMaterialFiles, WhatIsMissingIsAWarning) {
 TEST_F(ObjMaterialFiles, ALibraryBeyondTheStartIsAWarning) {
     write("m.mtl", "newmtl a\nKd 1 0 0\nnewmtl b\nKd 0 1 0\n");
     const std::string filler(300'000, '\n');
-    const Painted mesh = read("mtllib m.mtl\n" + kSquare + filler + "mtllib m.mtl\nusemtl a\nf 1 2 3\n");
+    const Painted mesh = read("mtllib m.mtl\n" + kTexturedSquare + filler + "mtllib m.mtl\nusemtl a\nf 1 2 3\n");
     ASSERT_EQ(mesh.warnings.size(), 1u);
     EXPECT_NE(mesh.warnings[0].find("too late"), std::string::npos);
     EXPECT_EQ(mesh.materials, std::vector<uint32_t>{0});

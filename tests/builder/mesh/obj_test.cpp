@@ -9,7 +9,7 @@ namespace {
 using test::ReadMesh;
 using test::Triangle;
 
-ReadMesh read(std::string_view bytes) { return test::readEveryWindow(openObj, bytes); }
+ReadMesh readObj(std::string_view bytes) { return test::readEveryWindow(openObj, bytes); }
 
 const std::string kSquare = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
 
@@ -17,7 +17,7 @@ TEST(Obj, ReadsEveryFormOfACorner) {
     for (const char* face :
          {"f 1 2 3", "f 1/7 2/8 3/9", "f 1//7 2//8 3//9", "f 1/1/1 2/2/2 3/3/3", "f -4 -3 -2", "f\t1\t2\t3  ",
           "  f 1 2 3 # comment", "f 1 2/ 3//", "f +1 +2 +3", "f 1 \\\n 2 \\\r\n3", "f 1 2\\\n 3", "f 1 2 3\r"}) {
-        const ReadMesh mesh = read(kSquare + face);
+        const ReadMesh mesh = readObj(kSquare + face);
         ASSERT_FALSE(mesh.error) << face << ": " << mesh.line();
         EXPECT_EQ(mesh.triangles, (std::vector<Triangle>{{0, 1, 2}})) << face;
         EXPECT_EQ(mesh.positions.size(), 4u);
@@ -25,13 +25,13 @@ TEST(Obj, ReadsEveryFormOfACorner) {
 }
 
 TEST(Obj, CutsPolygonsIntoFansAndSkipsThoseWithoutArea) {
-    const ReadMesh mesh = read(kSquare + "f 2 3 4 1\nf 1 2\nf 3\nf \n");
+    const ReadMesh mesh = readObj(kSquare + "f 2 3 4 1\nf 1 2\nf 3\nf \n");
     ASSERT_FALSE(mesh.error) << mesh.line();
     EXPECT_EQ(mesh.triangles, (std::vector<Triangle>{{1, 2, 3}, {1, 3, 0}}));
 }
 
 TEST(Obj, IgnoresEveryOtherStatement) {
-    const ReadMesh mesh = read(
+    const ReadMesh mesh = readObj(
         "\xEF\xBB\xBF# C:\\models\\\nmtllib a b.mtl\no name\ng f v\ns off\nvt 0 nan\nvn nan nan nan\n"
         "vp 1\nusemtl x\nfoo\n\n\n" +
         kSquare + "l 1 2 \\\n 3 4\np 1\nf 1 2 3\ncurv 0 1\n");
@@ -43,23 +43,24 @@ TEST(Obj, IgnoresEveryOtherStatement) {
 }
 
 TEST(Obj, ReadsNumbersInEveryNotation) {
-    const ReadMesh mesh = read("v +1 -2. .5\nv 1e2 2.E-1 -3.5e+1 1.0\nv 1 \\\n2 \\\n3\nf 1 2 3\n");
+    const ReadMesh mesh = readObj("v +1 -2. .5\nv 1e2 2.E-1 -3.5e+1 1.0\nv 1 \\\n2 \\\n3\nf 1 2 3\n");
     ASSERT_FALSE(mesh.error) << mesh.line();
     EXPECT_EQ(mesh.positions, (std::vector<glm::dvec3>{{1, -2, .5}, {100, .2, -35}, {1, 2, 3}}));
 }
 
 TEST(Obj, ReadsColoursAsFractionsOrBytes) {
-    EXPECT_EQ(read("v 0 0 0 0 0.5 1\nv 0 0 0\nf 1 2 1").colours, (std::vector<Rgba8>{0xFFFF8000, 0xFFFFFFFF}));
-    EXPECT_EQ(read("v 0 0 0 1 0 1\nv 0 0 0 255 128 2\nf 1 2 1").colours, (std::vector<Rgba8>{0xFF010001, 0xFF0280FF}));
-    EXPECT_EQ(read("v 0 0 0 1.0 1 0 0\nf 1 1 1").colours, (std::vector<Rgba8>{0xFF0000FF}));
-    EXPECT_EQ(read("v 0 0 0 nan 1 -7\nf 1 1 1").colours, (std::vector<Rgba8>{0xFF00FF00}));
-    const ReadMesh late = read("v 0 0 0\nv 0 0 0 1 1 1\nf 1 2 1");
+    EXPECT_EQ(readObj("v 0 0 0 0 0.5 1\nv 0 0 0\nf 1 2 1").colours, (std::vector<Rgba8>{0xFFFF8000, 0xFFFFFFFF}));
+    EXPECT_EQ(readObj("v 0 0 0 1 0 1\nv 0 0 0 255 128 2\nf 1 2 1").colours,
+              (std::vector<Rgba8>{0xFF010001, 0xFF0280FF}));
+    EXPECT_EQ(readObj("v 0 0 0 1.0 1 0 0\nf 1 1 1").colours, (std::vector<Rgba8>{0xFF0000FF}));
+    EXPECT_EQ(readObj("v 0 0 0 nan 1 -7\nf 1 1 1").colours, (std::vector<Rgba8>{0xFF00FF00}));
+    const ReadMesh late = readObj("v 0 0 0\nv 0 0 0 1 1 1\nf 1 2 1");
     EXPECT_FALSE(late.info.hasColour);
     EXPECT_TRUE(late.colours.empty());
 }
 
 TEST(Obj, FacesMayComeBeforeTheirVertices) {
-    const ReadMesh mesh = read("f 1 2 3\n" + kSquare + "f -1 -2 -3\n");
+    const ReadMesh mesh = readObj("f 1 2 3\n" + kSquare + "f -1 -2 -3\n");
     ASSERT_FALSE(mesh.error) << mesh.line();
     EXPECT_EQ(mesh.triangles, (std::vector<Triangle>{{0, 1, 2}, {3, 2, 1}}));
 }
@@ -67,17 +68,17 @@ TEST(Obj, FacesMayComeBeforeTheirVertices) {
 TEST(Obj, NormalsBelongToCorners) {
     const uint32_t x = packDirection({1, 0, 0}), y = packDirection({0, 1, 0}), z = packDirection({0, 0, 1}),
                    none = kUnknownNormal;
-    const ReadMesh mesh = read(kSquare +
-                               "f 1 2 3\nvn 9 0 0\nvn 0 -1e-300 0\nvn 0 0 1e300\nvn 0 0 0\nvn nan 1 1\nvn 1 a 2\n"
-                               "f 1//1 2/7/2 3//3\nf 1//-6 2//-5 3//4\nf 1//5 2//6 3//7\nf 1 2/1 3//\n"
-                               "f 1//1 2//2 3//3 4//1\nf 1//0 2//-7 3//9999999999999999999\n");
+    const ReadMesh mesh = readObj(kSquare +
+                                  "f 1 2 3\nvn 9 0 0\nvn 0 -1e-300 0\nvn 0 0 1e300\nvn 0 0 0\nvn nan 1 1\nvn 1 a 2\n"
+                                  "f 1//1 2/7/2 3//3\nf 1//-6 2//-5 3//4\nf 1//5 2//6 3//7\nf 1 2/1 3//\n"
+                                  "f 1//1 2//2 3//3 4//1\nf 1//0 2//-7 3//9999999999999999999\n");
     ASSERT_FALSE(mesh.error) << mesh.line();
     const std::vector<std::array<uint32_t, 3>> expected{{none, none, none}, {x, y, z},          {x, y, none},
                                                         {none, none, none}, {none, none, none}, {x, y, z},
                                                         {x, z, x},          {none, none, none}};
     EXPECT_EQ(mesh.cornerNormals, expected);
     EXPECT_TRUE(mesh.normals.empty());
-    EXPECT_TRUE(read("vn 0 0 1\n" + kSquare + "f 1 2 3\n").cornerNormals[0][0] == none);
+    EXPECT_TRUE(readObj("vn 0 0 1\n" + kSquare + "f 1 2 3\n").cornerNormals[0][0] == none);
 }
 
 struct BadCase {
@@ -103,7 +104,7 @@ TEST(Obj, ErrorsNameLineAndByte) {
         {"v 0 0 0\n\nv 0 1e999 0\n", "line 3, vertex 2", 9},
     };
     for (const BadCase& c : cases) {
-        const ReadMesh mesh = read(c.text);
+        const ReadMesh mesh = readObj(c.text);
         ASSERT_TRUE(mesh.error) << c.text;
         EXPECT_EQ(mesh.error->code, ErrorCode::InvalidInput);
         EXPECT_EQ(mesh.error->element, c.element) << mesh.line();
@@ -112,8 +113,8 @@ TEST(Obj, ErrorsNameLineAndByte) {
 }
 
 TEST(Obj, AMeshWithoutFacesIsAnError) {
-    EXPECT_NE(read(kSquare + "l 1 2\n").line().find("has no faces"), std::string::npos);
-    EXPECT_NE(read("# nothing\n").line().find("neither vertices nor faces"), std::string::npos);
+    EXPECT_NE(readObj(kSquare + "l 1 2\n").line().find("has no faces"), std::string::npos);
+    EXPECT_NE(readObj("# nothing\n").line().find("neither vertices nor faces"), std::string::npos);
 }
 
 /// Reads with coordinates; an error becomes its line.
@@ -168,7 +169,7 @@ TEST(Obj, IsLoadedWholeWithinLimits) {
 }
 
 TEST(Obj, Utf16IsNamed) {
-    const ReadMesh mesh = read(std::string_view("\xFE\xFF\0v", 4));
+    const ReadMesh mesh = readObj(std::string_view("\xFE\xFF\0v", 4));
     ASSERT_TRUE(mesh.error);
     EXPECT_EQ(mesh.error->code, ErrorCode::Unsupported);
 }
@@ -196,10 +197,10 @@ TEST(Obj, ReadsMoreThanAChunk) {
 
 TEST(Obj, EveryTruncationIsShorterOrAnError) {
     const std::string text = "# c\n" + kSquare + "f 1/1/1 \\\n2/2/2 -1\nf 1 2 3 4\n";
-    const ReadMesh whole = read(text);
+    const ReadMesh whole = readObj(text);
     ASSERT_FALSE(whole.error) << whole.line();
     for (size_t length = 0; length < text.size(); ++length) {
-        const ReadMesh mesh = read(std::string_view(text).substr(0, length));
+        const ReadMesh mesh = readObj(std::string_view(text).substr(0, length));
         if (!mesh.error) {
             EXPECT_LE(mesh.triangles.size(), whole.triangles.size());
         }

@@ -11,16 +11,16 @@ using test::readEveryWindow;
 using test::ReadMesh;
 using test::Triangle;
 
-ReadMesh read(std::string_view bytes) { return readEveryWindow(openOff, bytes); }
+ReadMesh readOff(std::string_view bytes) { return readEveryWindow(openOff, bytes); }
 
-std::string lineOf(std::string_view bytes) {
-    const ReadMesh mesh = read(bytes);
+std::string lineOfOff(std::string_view bytes) {
+    const ReadMesh mesh = readOff(bytes);
     EXPECT_TRUE(mesh.error) << bytes;
     return mesh.line();
 }
 
 TEST(Off, ReadsPolygonsCommentsAndBlankLines) {
-    const ReadMesh mesh = read(
+    const ReadMesh mesh = readOff(
         "# a comment\n\nOFF # another\n4 2 0\n0 0 0\n1 0 0\r\n\n# between\n1 1 0\n0 1 5.5e-1 # after\n4 0 1 2 3\n3 3 2 "
         "1\n");
     ASSERT_FALSE(mesh.error) << mesh.line();
@@ -33,7 +33,7 @@ TEST(Off, KeywordCountsAndTheirForms) {
     const std::string body = "0 0 0\n1 0 0\n0 1 0\n3 0 1 2";
     for (const char* start : {"OFF\n3 1 0\n", "OFF 3 1 3\n", "OFF3 1 3\n", "3 1 0\n", "OFF\n3 1\n",
                               " \tOFF\n3 1 0 # or nah\n", "\xEF\xBB\xBFOFF\n3 1 0\n"})
-        EXPECT_EQ(read(start + body).triangles.size(), 1u) << start;
+        EXPECT_EQ(readOff(start + body).triangles.size(), 1u) << start;
     EXPECT_EQ(openOff(ByteSource::fromMemory("4OFF\n3 1 0\n", "f")).error().code, ErrorCode::Unsupported);
     EXPECT_TRUE(looksLikeOff("# x\n\n STCNOFF BINARY\n"));
     EXPECT_FALSE(looksLikeOff("# OFF\nv 0 0 0\n"));
@@ -41,12 +41,12 @@ TEST(Off, KeywordCountsAndTheirForms) {
 }
 
 TEST(Off, VertexColoursAreFractionsOrBytes) {
-    const ReadMesh bytes = read("COFF\n3 1 0\n0 0 0 255 1 0 255\n1 0 0 0 300 -5 7\n0 1 0 1 2 3\n3 0 1 2\n");
+    const ReadMesh bytes = readOff("COFF\n3 1 0\n0 0 0 255 1 0 255\n1 0 0 0 300 -5 7\n0 1 0 1 2 3\n3 0 1 2\n");
     EXPECT_EQ(bytes.colours, (std::vector<Rgba8>{0xFF0001FF, 0x0700FF00, 0xFF030201}));
-    const ReadMesh reals = read("NCOFF\n3 1 0\n");
+    const ReadMesh reals = readOff("NCOFF\n3 1 0\n");
     EXPECT_TRUE(reals.error) << "the order is C, then N";
     const ReadMesh both =
-        read("CNOFF\n3 1 0\n0 0 0 0 0 1 1.0 0 0 1\n1 0 0 0 0 1 0 0.5 0 1\n0 1 0 0 0 1 0 0 1 0.0\n3 0 1 2\n");
+        readOff("CNOFF\n3 1 0\n0 0 0 0 0 1 1.0 0 0 1\n1 0 0 0 0 1 0 0.5 0 1\n0 1 0 0 0 1 0 0 1 0.0\n3 0 1 2\n");
     ASSERT_FALSE(both.error) << both.line();
     EXPECT_EQ(both.colours, (std::vector<Rgba8>{0xFF0000FF, 0xFF008000, 0x00FF0000}));
 }
@@ -60,18 +60,18 @@ TEST(Off, FaceColoursAreAWarning) {
 }
 
 TEST(Off, WhatIsWrongIsNamed) {
-    EXPECT_NE(lineOf("OFF\n3 1 0\n0 0 0\n1 0 0\n0 x 0\n3 0 1 2\n").find("vertex 2: byte 24: 'x' is not a number"),
+    EXPECT_NE(lineOfOff("OFF\n3 1 0\n0 0 0\n1 0 0\n0 x 0\n3 0 1 2\n").find("vertex 2: byte 24: 'x' is not a number"),
               std::string::npos);
-    EXPECT_NE(lineOf("OFF\n3 1 0\n0 0 0\n1 0\n0 0 0\n3 0 1 2\n").find("vertex 1"), std::string::npos);
-    EXPECT_NE(lineOf("OFF\n3 1 0\n0 0 0\n1 nan 0\n0 0 0\n3 0 1 2\n").find("not finite"), std::string::npos);
-    EXPECT_NE(
-        lineOf("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 3\n").find("face 0: byte 34: vertex number 3 is out of range"),
-        std::string::npos);
-    EXPECT_NE(lineOf("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1\n").find("only 2"), std::string::npos);
-    EXPECT_NE(lineOf("OFF\n3 2 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n").find("truncated"), std::string::npos);
-    EXPECT_NE(lineOf("OFF\n353535235358 6 0\n0 0 0\n").find("353535235358"), std::string::npos);
-    EXPECT_NE(lineOf("OFF\n3 0 0\n0 0 0\n0 0 0\n0 0 0\n").find("no faces"), std::string::npos);
-    EXPECT_NE(lineOf("OFF\n").find("ends inside the header"), std::string::npos);
+    EXPECT_NE(lineOfOff("OFF\n3 1 0\n0 0 0\n1 0\n0 0 0\n3 0 1 2\n").find("vertex 1"), std::string::npos);
+    EXPECT_NE(lineOfOff("OFF\n3 1 0\n0 0 0\n1 nan 0\n0 0 0\n3 0 1 2\n").find("not finite"), std::string::npos);
+    EXPECT_NE(lineOfOff("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 3\n")
+                  .find("face 0: byte 34: vertex number 3 is out of range"),
+              std::string::npos);
+    EXPECT_NE(lineOfOff("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1\n").find("only 2"), std::string::npos);
+    EXPECT_NE(lineOfOff("OFF\n3 2 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n").find("truncated"), std::string::npos);
+    EXPECT_NE(lineOfOff("OFF\n353535235358 6 0\n0 0 0\n").find("353535235358"), std::string::npos);
+    EXPECT_NE(lineOfOff("OFF\n3 0 0\n0 0 0\n0 0 0\n0 0 0\n").find("no faces"), std::string::npos);
+    EXPECT_NE(lineOfOff("OFF\n").find("ends inside the header"), std::string::npos);
 }
 
 // Geomview's layout, in either byte order.
@@ -96,7 +96,7 @@ std::string binaryOff(bool big, bool colours) {
 TEST(Off, ReadsBinaryOfEitherByteOrder) {
     for (const bool big : {false, true})
         for (const bool colours : {false, true}) {
-            const ReadMesh mesh = read(binaryOff(big, colours));
+            const ReadMesh mesh = readOff(binaryOff(big, colours));
             ASSERT_FALSE(mesh.error) << mesh.line();
             EXPECT_EQ(mesh.positions[3], glm::dvec3(3, 9, -0.5));
             EXPECT_EQ(mesh.triangles, (std::vector<Triangle>{{0, 1, 2}, {0, 2, 3}, {3, 2, 1}}));
@@ -109,7 +109,7 @@ TEST(Off, ReadsBinaryOfEitherByteOrder) {
 
 TEST(Off, EveryTruncationOfABinaryFileIsAnError) {
     const std::string bytes = binaryOff(true, true);
-    for (size_t kept = 0; kept < bytes.size(); ++kept) EXPECT_NE(lineOf(bytes.substr(0, kept)), "") << kept;
+    for (size_t kept = 0; kept < bytes.size(); ++kept) EXPECT_NE(lineOfOff(bytes.substr(0, kept)), "") << kept;
 }
 
 }  // namespace

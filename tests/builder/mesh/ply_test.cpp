@@ -89,7 +89,7 @@ private:
     PlyEncoding encoding_;
 };
 
-ReadMesh read(std::string_view bytes) { return test::readEveryWindow(openPly, bytes); }
+ReadMesh readPly(std::string_view bytes) { return test::readEveryWindow(openPly, bytes); }
 
 void addVertexHeader(PlyWriter& ply, int count, PlyType type = PlyType::Float32) {
     ply.header("element vertex " + std::to_string(count));
@@ -115,7 +115,7 @@ std::string square(PlyEncoding encoding, std::initializer_list<double> face, Ply
     return ply.text;
 }
 
-const std::vector<glm::dvec3> kSquare{{0, 0, 1}, {1, 0, 2}, {1, 1, 3}, {0, 1, 4}};
+const std::vector<glm::dvec3> kSquareCorners{{0, 0, 1}, {1, 0, 2}, {1, 1, 3}, {0, 1, 4}};
 
 TEST(Ply, NormalsOfEveryTypeAreDirections) {
     for (const PlyEncoding encoding : kEncodings)
@@ -130,7 +130,7 @@ TEST(Ply, NormalsOfEveryTypeAreDirections) {
             for (const auto& n : normals)
                 ply.row().values(PlyType::Float32, {n[0], n[1], 1}).values(type, {n[2], 9, n[0], n[1]});
             ply.row().list(PlyType::Uint8, PlyType::Int32, {0, 1, 2}).row();
-            const ReadMesh mesh = read(ply.text);
+            const ReadMesh mesh = readPly(ply.text);
             ASSERT_FALSE(mesh.error) << mesh.line();
             EXPECT_EQ(mesh.normals, (std::vector<uint32_t>{packDirection({0, 0, 1}), packDirection({1, 0, 0}),
                                                            kUnknownNormal, packDirection({1, 2, 3})}));
@@ -148,8 +148,9 @@ TEST(Ply, NormalsThatAreNoneAreUnknown) {
         for (const auto& n : normals)
             ply.row().values(PlyType::Float32, {0, 1, 2}).values(PlyType::Float64, {n[0], n[1], n[2]});
         ply.row().list(PlyType::Uint8, PlyType::Int32, {0, 1, 2}).row();
-        EXPECT_EQ(read(ply.text).normals, (std::vector<uint32_t>{kUnknownNormal, kUnknownNormal,
-                                                                 packDirection({0, 1, 0}), packDirection({1, 0, 0})}));
+        EXPECT_EQ(readPly(ply.text).normals,
+                  (std::vector<uint32_t>{kUnknownNormal, kUnknownNormal, packDirection({0, 1, 0}),
+                                         packDirection({1, 0, 0})}));
     }
     // Two of three are not a normal.
     PlyWriter ply(PlyEncoding::Ascii);
@@ -158,7 +159,7 @@ TEST(Ply, NormalsThatAreNoneAreUnknown) {
     ply.header("element face 1").header("property list uchar int vertex_indices").header("end_header");
     for (int i = 0; i < 4; ++i) ply.row().values(PlyType::Float32, {0, 1, 2, 0, 1});
     ply.row().list(PlyType::Uint8, PlyType::Int32, {0, 1, 2}).row();
-    EXPECT_TRUE(read(ply.text).normals.empty());
+    EXPECT_TRUE(readPly(ply.text).normals.empty());
 }
 
 TEST(Ply, ReadsPositionsOfEveryType) {
@@ -169,9 +170,9 @@ TEST(Ply, ReadsPositionsOfEveryType) {
             ply.header("element face 1").header("property list uchar int vertex_index").header("end_header");
             addSquare(ply, type);
             ply.list(PlyType::Uint8, PlyType::Int32, {0, 1, 2}).row();
-            const ReadMesh mesh = read(ply.text);
+            const ReadMesh mesh = readPly(ply.text);
             ASSERT_FALSE(mesh.error) << mesh.line();
-            EXPECT_EQ(mesh.positions, kSquare) << nameOf(type);
+            EXPECT_EQ(mesh.positions, kSquareCorners) << nameOf(type);
         }
     }
 }
@@ -180,7 +181,7 @@ TEST(Ply, ReadsListsOfEveryType) {
     for (const PlyEncoding encoding : kEncodings)
         for (const PlyType count : kTypes)
             for (const PlyType index : kTypes) {
-                const ReadMesh mesh = read(square(encoding, {3, 1, 2}, count, index));
+                const ReadMesh mesh = readPly(square(encoding, {3, 1, 2}, count, index));
                 ASSERT_FALSE(mesh.error) << mesh.line();
                 EXPECT_EQ(mesh.triangles, (std::vector<Triangle>{{3, 1, 2}})) << nameOf(count) << nameOf(index);
             }
@@ -188,9 +189,9 @@ TEST(Ply, ReadsListsOfEveryType) {
 
 TEST(Ply, CutsPolygonsIntoFansAndSkipsThoseWithoutArea) {
     for (const PlyEncoding encoding : kEncodings) {
-        EXPECT_EQ(read(square(encoding, {2, 3, 0, 1})).triangles, (std::vector<Triangle>{{2, 3, 0}, {2, 0, 1}}));
+        EXPECT_EQ(readPly(square(encoding, {2, 3, 0, 1})).triangles, (std::vector<Triangle>{{2, 3, 0}, {2, 0, 1}}));
         for (const auto& face : {std::initializer_list<double>{}, {1}, {1, 2}}) {
-            const ReadMesh mesh = read(square(encoding, face));
+            const ReadMesh mesh = readPly(square(encoding, face));
             EXPECT_FALSE(mesh.error) << mesh.line();
             EXPECT_TRUE(mesh.triangles.empty());
         }
@@ -200,7 +201,7 @@ TEST(Ply, CutsPolygonsIntoFansAndSkipsThoseWithoutArea) {
 TEST(Ply, TheItemsOfAPolygonAreNotTakenForTriangles) {
     // Its items, read from one byte on, look like "3, then three vertex numbers".
     for (const PlyEncoding encoding : kEncodings) {
-        const ReadMesh mesh = read(square(encoding, {3, 0, 0, 0, 0, 1}));
+        const ReadMesh mesh = readPly(square(encoding, {3, 0, 0, 0, 0, 1}));
         ASSERT_FALSE(mesh.error) << mesh.line();
         EXPECT_EQ(mesh.triangles, (std::vector<Triangle>{{3, 0, 0}, {3, 0, 0}, {3, 0, 0}, {3, 0, 1}}));
     }
@@ -213,7 +214,7 @@ TEST(Ply, CutsStripsAndRestartsAtMinusOne) {
         ply.header("element tristrips 1").header("property list int int vertex_indices").header("end_header");
         addSquare(ply);
         ply.list(PlyType::Int32, PlyType::Int32, {0, 1, 2, 3, -1, 3, 2, 1, 1, 0}).row();
-        const ReadMesh mesh = read(ply.text);
+        const ReadMesh mesh = readPly(ply.text);
         ASSERT_FALSE(mesh.error) << mesh.line();
         // The second strip: 321, then 211 and 110 only steer.
         EXPECT_EQ(mesh.triangles, (std::vector<Triangle>{{0, 1, 2}, {2, 1, 3}, {3, 2, 1}}));
@@ -245,7 +246,7 @@ TEST(Ply, ReadsFacesBeforeVerticesAndSkipsWhatItDoesNotKnow) {
             ply.values(PlyType::Float32, {v + 1.5, 9, v + 2.5}).row();
         }
         ply.list(PlyType::Uint8, PlyType::Uint8, {65, 66}).row();
-        const ReadMesh mesh = read(ply.text);
+        const ReadMesh mesh = readPly(ply.text);
         ASSERT_FALSE(mesh.error) << mesh.line();
         EXPECT_EQ(mesh.triangles, (std::vector<Triangle>{{0, 1, 2}, {0, 1, 2}}));
         EXPECT_EQ(mesh.positions, (std::vector<glm::dvec3>{{1.5, 2.5, .5}, {2.5, 3.5, 1.5}, {3.5, 4.5, 2.5}}));
@@ -274,7 +275,7 @@ TEST(Ply, ConvertsColoursOfEveryType) {
                 ply.values(PlyType::Float32, {0, 0, 0});
                 for (const double v : c.values) ply.value(c.type, v);
                 ply.row().list(PlyType::Uint8, PlyType::Int32, {0, 0, 0}).row();
-                const ReadMesh mesh = read(ply.text);
+                const ReadMesh mesh = readPly(ply.text);
                 ASSERT_FALSE(mesh.error) << mesh.line();
                 ASSERT_TRUE(mesh.info.hasColour);
                 EXPECT_EQ(mesh.colours, std::vector<Rgba8>{c.expected}) << nameOf(c.type);
@@ -282,7 +283,7 @@ TEST(Ply, ConvertsColoursOfEveryType) {
 }
 
 TEST(Ply, WithoutAlphaColoursAreOpaque) {
-    const ReadMesh mesh = read(
+    const ReadMesh mesh = readPly(
         "ply\nformat ascii 1.0\nelement vertex 1\nproperty int x\nproperty int y\nproperty int z\n"
         "property uchar r\nproperty uchar g\nproperty uchar b\nelement face 1\n"
         "property list uchar int vertex_indices\nend_header\n0 0 0 17 34 51\n3 0 0 0\n");
@@ -295,9 +296,9 @@ TEST(Ply, ReadsEveryKindOfLineEnd) {
     for (const char* end : {"\r\n", "\r"}) {
         std::string text;
         for (const char c : plain) c == '\n' ? text += end : text += c;
-        const ReadMesh mesh = read(text);
+        const ReadMesh mesh = readPly(text);
         ASSERT_FALSE(mesh.error) << mesh.line();
-        EXPECT_EQ(mesh.positions, kSquare);
+        EXPECT_EQ(mesh.positions, kSquareCorners);
         EXPECT_EQ(mesh.triangles.size(), 2u);
     }
 }
@@ -309,7 +310,7 @@ TEST(Ply, ABodyMayBeginWithALineFeed) {
         for (const char* axis : {"x", "y", "z"}) text += "property uchar " + std::string(axis) + end;
         text += "element face 1" + end + "property list uchar uchar vertex_index" + end + "end_header" + end;
         text += std::string("\n\n\n\x03\0\0\0", 7);
-        const ReadMesh mesh = read(text);
+        const ReadMesh mesh = readPly(text);
         ASSERT_FALSE(mesh.error) << mesh.line();
         EXPECT_EQ(mesh.positions, std::vector<glm::dvec3>{glm::dvec3(10)});
     }
@@ -317,7 +318,7 @@ TEST(Ply, ABodyMayBeginWithALineFeed) {
 
 TEST(Ply, IgnoresBytesAfterTheLastRow) {
     for (const PlyEncoding encoding : kEncodings) {
-        const ReadMesh mesh = read(square(encoding, {0, 1, 2}) + "trailing bytes");
+        const ReadMesh mesh = readPly(square(encoding, {0, 1, 2}) + "trailing bytes");
         EXPECT_FALSE(mesh.error) << mesh.line();
         EXPECT_EQ(mesh.triangles.size(), 1u);
     }
@@ -351,13 +352,13 @@ TEST(Ply, AnIndexOutOfRangeNamesFaceAndByte) {
         const bool ascii = encoding == PlyEncoding::Ascii;
         for (const double bad : {4.0, -1.0, 2147483647.0}) {
             const std::string text = square(encoding, {0, bad, 2});
-            const ReadMesh mesh = read(text);
+            const ReadMesh mesh = readPly(text);
             ASSERT_TRUE(mesh.error);
             EXPECT_EQ(mesh.error->code, ErrorCode::InvalidInput);
             EXPECT_EQ(mesh.error->element, "face 0");
             EXPECT_EQ(mesh.error->byte, ascii ? text.rfind("\n3 0 ") + 5 : text.size() - 8);
         }
-        EXPECT_EQ(read(square(encoding, {0, 1.5, 2}, PlyType::Uint8, PlyType::Float32)).error->element, "face 0");
+        EXPECT_EQ(readPly(square(encoding, {0, 1.5, 2}, PlyType::Uint8, PlyType::Float32)).error->element, "face 0");
     }
 }
 
@@ -379,7 +380,7 @@ TEST(Ply, APositionThatIsNotFiniteNamesVertexAndByte) {
                     if (withList) ply.list(PlyType::Uint8, PlyType::Uint8, {});
                     ply.row().list(PlyType::Uint8, PlyType::Int32, {0, 1, 0}).row();
                     ASSERT_GT(at, body);
-                    const ReadMesh mesh = read(ply.text);
+                    const ReadMesh mesh = readPly(ply.text);
                     ASSERT_TRUE(mesh.error);
                     EXPECT_EQ(mesh.error->element, "vertex 1") << mesh.line();
                     EXPECT_EQ(mesh.error->byte, at) << mesh.line();
@@ -394,7 +395,7 @@ TEST(Ply, ListLengthsThatLieAreErrors) {
             wrong.text.clear();
             wrong.value(PlyType::Int32, length);
             text.replace(text.size() - 16, 4, wrong.text);
-            const ReadMesh mesh = read(text);
+            const ReadMesh mesh = readPly(text);
             ASSERT_TRUE(mesh.error);
             EXPECT_EQ(mesh.error->element, "face 0");
             EXPECT_EQ(mesh.error->byte, text.size() - 16);
@@ -403,7 +404,7 @@ TEST(Ply, ListLengthsThatLieAreErrors) {
         std::string text = square(PlyEncoding::Ascii, {0, 1, 2});
         const size_t at = text.rfind("3 0 1 2");
         text.replace(at, 1, length);
-        const ReadMesh mesh = read(text);
+        const ReadMesh mesh = readPly(text);
         ASSERT_TRUE(mesh.error) << length;
         EXPECT_EQ(mesh.error->byte, at) << mesh.line();
     }
@@ -427,9 +428,9 @@ TEST(Ply, CountsThatLieAreFoundBeforeAnythingIsRead) {
 TEST(Ply, EveryTruncationOfABinaryFileIsAnError) {
     for (const PlyEncoding encoding : {PlyEncoding::LittleEndian, PlyEncoding::BigEndian}) {
         const std::string text = square(encoding, {0, 1, 2, 3});
-        ASSERT_FALSE(read(text).error);
+        ASSERT_FALSE(readPly(text).error);
         for (size_t length = 0; length < text.size(); ++length) {
-            const ReadMesh mesh = read(std::string_view(text).substr(0, length));
+            const ReadMesh mesh = readPly(std::string_view(text).substr(0, length));
             ASSERT_TRUE(mesh.error) << length;
             EXPECT_EQ(mesh.line().find('\n'), std::string::npos);
             EXPECT_TRUE(mesh.error->byte) << mesh.line();
@@ -441,14 +442,14 @@ TEST(Ply, EveryTruncationOfATextBeforeItsLastValueIsAnError) {
     const std::string text = square(PlyEncoding::Ascii, {0, 1, 2, 3});
     const size_t lastValue = text.rfind('3') + 1;
     for (size_t length = 0; length < lastValue; ++length)
-        EXPECT_TRUE(read(std::string_view(text).substr(0, length)).error) << length;
-    EXPECT_FALSE(read(std::string_view(text).substr(0, lastValue)).error);
+        EXPECT_TRUE(readPly(std::string_view(text).substr(0, length)).error) << length;
+    EXPECT_FALSE(readPly(std::string_view(text).substr(0, lastValue)).error);
 }
 
 TEST(Ply, ALineWithTooFewValuesIsFoundInItsRow) {
     std::string text = square(PlyEncoding::Ascii, {0, 1, 2});
     const size_t at = text.find("1 0 2 \n");
-    const ReadMesh mesh = read(text.replace(at, 7, "1 0\n  "));
+    const ReadMesh mesh = readPly(text.replace(at, 7, "1 0\n  "));
     ASSERT_TRUE(mesh.error);
     EXPECT_EQ(mesh.error->element, "vertex 1");
     EXPECT_EQ(mesh.error->byte, at + 3);
@@ -457,9 +458,9 @@ TEST(Ply, ALineWithTooFewValuesIsFoundInItsRow) {
 TEST(Ply, ValuesBeyondTheDeclaredOnesAreIgnored) {
     std::string text = square(PlyEncoding::Ascii, {0, 1, 2});
     const size_t at = text.find("1 0 2 \n");
-    const ReadMesh mesh = read(text.replace(at, 6, "1 0 2 8 9 10"));
+    const ReadMesh mesh = readPly(text.replace(at, 6, "1 0 2 8 9 10"));
     EXPECT_FALSE(mesh.error) << mesh.line();
-    EXPECT_EQ(mesh.positions, kSquare);
+    EXPECT_EQ(mesh.positions, kSquareCorners);
 }
 
 struct HeaderCase {
@@ -497,7 +498,7 @@ TEST(Ply, BrokenHeadersAreNamed) {
          "no list property"},
     };
     for (const HeaderCase& c : cases) {
-        const ReadMesh mesh = read(c.header);
+        const ReadMesh mesh = readPly(c.header);
         ASSERT_TRUE(mesh.error) << c.header;
         EXPECT_NE(mesh.line().find(c.inMessage), std::string::npos) << mesh.line();
     }

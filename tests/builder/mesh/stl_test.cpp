@@ -13,7 +13,7 @@ namespace {
 using test::ReadMesh;
 using test::Triangle;
 
-ReadMesh read(std::string_view bytes) { return test::readEveryWindow(openStl, bytes); }
+ReadMesh readStl(std::string_view bytes) { return test::readEveryWindow(openStl, bytes); }
 
 std::string binary(uint32_t count, uint32_t declared, std::string_view title = "binary") {
     std::string bytes(80, '\0');
@@ -37,7 +37,7 @@ const std::string kText =
     "endsolid a name with facet\n";
 
 TEST(Stl, ReadsBinary) {
-    const ReadMesh mesh = read(binary(3, 3));
+    const ReadMesh mesh = readStl(binary(3, 3));
     ASSERT_FALSE(mesh.error) << mesh.line();
     EXPECT_EQ(mesh.info.format, "STL binary");
     EXPECT_EQ(mesh.info.faces, 3u);
@@ -47,16 +47,16 @@ TEST(Stl, ReadsBinary) {
 
 TEST(Stl, ABinaryFileMayBeginWithSolid) {
     for (const char* title : {"solid", "solid model facet normal", "SOLID x\nfacet "}) {
-        const ReadMesh mesh = read(binary(2, 2, title));
+        const ReadMesh mesh = readStl(binary(2, 2, title));
         ASSERT_FALSE(mesh.error) << mesh.line();
         EXPECT_EQ(mesh.info.format, "STL binary");
         // Even when bytes follow, the zeros tell it from text.
-        EXPECT_EQ(read(binary(2, 2, title) + "more").triangles.size(), 2u);
+        EXPECT_EQ(readStl(binary(2, 2, title) + "more").triangles.size(), 2u);
     }
 }
 
 TEST(Stl, ReadsText) {
-    const ReadMesh mesh = read(kText);
+    const ReadMesh mesh = readStl(kText);
     ASSERT_FALSE(mesh.error) << mesh.line();
     EXPECT_EQ(mesh.info.format, "STL ASCII");
     EXPECT_EQ(mesh.positions,
@@ -68,13 +68,13 @@ TEST(Stl, ReadsTextInAnyCaseWithAnyLineEndAndManySolids) {
     std::string upper;
     for (const char c : kText) upper += c == '\n' ? std::string("\r\n") : std::string(1, char(std::toupper(c)));
     for (size_t at; (at = upper.find("NAN")) != std::string::npos;) upper.replace(at, 3, "nan");
-    const ReadMesh mesh = read("\n  " + upper + "solid empty\nendsolid\n" + kText);
+    const ReadMesh mesh = readStl("\n  " + upper + "solid empty\nendsolid\n" + kText);
     ASSERT_FALSE(mesh.error) << mesh.line();
     EXPECT_EQ(mesh.triangles.size(), 4u);
 }
 
 TEST(Stl, TheLastEndsolidMayBeMissing) {
-    const ReadMesh mesh = read(kText.substr(0, kText.rfind("endsolid")));
+    const ReadMesh mesh = readStl(kText.substr(0, kText.rfind("endsolid")));
     EXPECT_FALSE(mesh.error) << mesh.line();
     EXPECT_EQ(mesh.triangles.size(), 2u);
 }
@@ -82,7 +82,7 @@ TEST(Stl, TheLastEndsolidMayBeMissing) {
 TEST(Stl, EveryTruncationOfABinaryFileNamesFacetAndByte) {
     const std::string bytes = binary(3, 3);
     for (size_t length = 0; length < bytes.size(); ++length) {
-        const ReadMesh mesh = read(std::string_view(bytes).substr(0, length));
+        const ReadMesh mesh = readStl(std::string_view(bytes).substr(0, length));
         ASSERT_TRUE(mesh.error) << length;
         EXPECT_EQ(mesh.error->element, length < 84 ? "header" : "facet " + std::to_string((length - 84) / 50));
         EXPECT_EQ(mesh.error->byte, length < 84 ? length : 84 + (length - 84) / 50 * 50);
@@ -93,7 +93,7 @@ TEST(Stl, EveryTruncationOfATextInsideAFacetIsAnError) {
     const size_t secondFacet = kText.find("facet normal nan");
     const size_t end = kText.rfind("endfacet") + 8;
     for (size_t length = 0; length < kText.size(); ++length) {
-        const ReadMesh mesh = read(std::string_view(kText).substr(0, length));
+        const ReadMesh mesh = readStl(std::string_view(kText).substr(0, length));
         if (length > secondFacet && length < end) {
             EXPECT_TRUE(mesh.error) << length;
         }
@@ -110,8 +110,8 @@ TEST(Stl, CountsThatLieAreFoundBeforeAnythingIsRead) {
         EXPECT_EQ(opened.error().element, "facet 2");
         EXPECT_EQ(opened.error().byte, 184u);
     }
-    EXPECT_NE(read(binary(2, 0)).line().find("has no facets"), std::string::npos);
-    EXPECT_NE(read("solid x\nendsolid x\n").line().find("has no facets"), std::string::npos);
+    EXPECT_NE(readStl(binary(2, 0)).line().find("has no facets"), std::string::npos);
+    EXPECT_NE(readStl("solid x\nendsolid x\n").line().find("has no facets"), std::string::npos);
 }
 
 TEST(Stl, AFileLongerThanItsCountCanSayIsRefused) {
@@ -137,14 +137,14 @@ TEST(Stl, APositionThatIsNotFiniteNamesFacetVertexAndByte) {
         std::string bytes = binary(3, 3);
         const size_t vertex = 84 + 50 + 12 + 24;  // the last of facet 1
         std::memcpy(bytes.data() + vertex + 4, &bad, 4);
-        const ReadMesh mesh = read(bytes);
+        const ReadMesh mesh = readStl(bytes);
         ASSERT_TRUE(mesh.error);
         EXPECT_EQ(mesh.error->element, "facet 1, vertex 2");
         EXPECT_EQ(mesh.error->byte, vertex);
     }
     std::string text = kText;
     const size_t at = text.find("8 9 endloop");
-    const ReadMesh mesh = read(text.replace(at, 1, "inf"));
+    const ReadMesh mesh = readStl(text.replace(at, 1, "inf"));
     ASSERT_TRUE(mesh.error);
     EXPECT_EQ(mesh.error->element, "facet 1, vertex 2");
     EXPECT_EQ(mesh.error->byte, at);
@@ -161,7 +161,7 @@ TEST(Stl, WordsThatDoNotBelongAreNamed) {
                                       {"solid a", "sold a"}}) {
         std::string text = kText;
         text.replace(text.find(word), std::strlen(word), other);
-        const ReadMesh mesh = read(text);
+        const ReadMesh mesh = readStl(text);
         ASSERT_TRUE(mesh.error) << other;
         EXPECT_TRUE(mesh.error->byte) << mesh.line();
     }

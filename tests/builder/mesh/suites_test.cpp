@@ -13,8 +13,6 @@
 namespace vcp {
 namespace {
 
-const std::filesystem::path kData = VCP_SHARED_DATA_DIR;
-
 // What the first byte of a child's answer means.
 constexpr char kRead = 'r', kRefused = 'e', kBroken = 'b';
 
@@ -87,10 +85,10 @@ TEST(Suites, EveryFileIsReadOrRefusedInOneLine) {
     std::vector<std::filesystem::path> files;
     for (const char* folder : {"suites", "draco", "scans", "scenes", "colour", "terrain"}) {
         std::error_code absent;
-        for (const auto& entry : std::filesystem::recursive_directory_iterator(kData / folder, absent))
+        for (const auto& entry : std::filesystem::recursive_directory_iterator(test::kSharedData / folder, absent))
             if (entry.is_regular_file()) files.push_back(entry.path());
     }
-    if (files.empty()) GTEST_SKIP() << "no mesh suites in " << kData;
+    if (files.empty()) GTEST_SKIP() << "no mesh suites in " << test::kSharedData;
     std::ranges::sort(files);
     size_t read = 0;
     const bool verbose = std::getenv("VCP_SUITES_VERBOSE");
@@ -104,7 +102,7 @@ TEST(Suites, EveryFileIsReadOrRefusedInOneLine) {
             EXPECT_NE(answer.text.find(path.filename().string()), std::string::npos) << "no file in: " << answer.text;
         }
         read += answer.text[0] == kRead;
-        if (verbose) std::cout << path.lexically_relative(kData).string() << ": " << answer.text << '\n';
+        if (verbose) std::cout << path.lexically_relative(test::kSharedData).string() << ": " << answer.text << '\n';
     }
     EXPECT_GE(read, 340u) << "of " << files.size();
 }

@@ -20,19 +20,19 @@
 namespace vcp {
 namespace {
 
-constexpr uint32_t kLog2Cells = 5;
+constexpr uint32_t kTreeLog2Cells = 5;
 constexpr int kSteps = kLatticePerCell / kSubcells;
 
-struct Page {
+struct TreePage {
     LatticeMesh mesh;
     std::vector<uint32_t> numbers;  ///< all triangles of the mesh
     glm::u32vec3 at;
 
-    Page(const IndexedMesh& m, glm::u32vec3 position) : mesh(test::onLattice(m)), at(position) {
+    TreePage(const IndexedMesh& m, glm::u32vec3 position) : mesh(test::onLattice(m)), at(position) {
         numbers.resize(mesh.triangles.size());
         std::iota(numbers.begin(), numbers.end(), 0u);
     }
-    [[nodiscard]] PageTree tree() const { return buildExactTree(mesh, numbers, at, kLog2Cells); }
+    [[nodiscard]] PageTree tree() const { return buildExactTree(mesh, numbers, at, kTreeLog2Cells); }
     [[nodiscard]] std::array<glm::i32vec3, 3> corners(uint32_t k, const PageTree& tree) const {
         std::array<glm::i32vec3, 3> t;
         for (size_t i = 0; i < 3; ++i) t[i] = mesh.positions[mesh.triangles[k][i]] - tree.originLattice;
@@ -50,7 +50,7 @@ struct Page {
 };
 
 /// Checks a tree against all triangles of the mesh. Returns the largest leaf's number of triangles.
-size_t expectSound(const Page& page, const PageTree& tree) {
+size_t expectSound(const TreePage& page, const PageTree& tree) {
     size_t most = 0, hard = 0;
     for (const TreeNode& n : tree.nodes) {
         if (n.kind == TreeNode::Kind::Internal) continue;
@@ -90,7 +90,7 @@ std::vector<std::vector<std::array<uint64_t, 3>>> trianglesByLeaf(const PageView
 }
 
 /// Checks that the tree's bytes are read back as they are.
-void expectStored(const Page& page, PageTree& tree) {
+void expectStored(const TreePage& page, PageTree& tree) {
     const EncodedPage encoded = encodePage(tree, page.mesh);
     const std::vector<std::byte> bytes = pageOf(encoded.draft);
     const auto view = parsePage(bytes);
@@ -115,7 +115,7 @@ IndexedMesh bumpyTorus() {
 
 TEST(ExactTree, LeavesNameWhatTouchesThem) {
     for (const glm::u32vec3 at : {glm::u32vec3(0), glm::u32vec3(1, 0, 0), glm::u32vec3(1, 1, 1)}) {
-        const Page page(bumpyTorus(), at);
+        const TreePage page(bumpyTorus(), at);
         PageTree tree = page.tree();
         EXPECT_LE(expectSound(page, tree), kExactLeafTriangles);
         EXPECT_GT(tree.hard.size(), 100u);
@@ -126,7 +126,7 @@ TEST(ExactTree, LeavesNameWhatTouchesThem) {
 TEST(ExactTree, MarksTheCellsThatAreTouched) {
     IndexedMesh mesh = bumpyTorus();
     test::append(mesh, test::boxMesh({3, 3, 3}, {25, 9, 12}, 2));
-    const Page page(mesh, {0, 0, 0});
+    const TreePage page(mesh, {0, 0, 0});
     const PageTree tree = page.tree();
     const int n = tree.cells;
     std::vector<bool> touched(size_t(n) * n * n);
@@ -149,7 +149,7 @@ TEST(ExactTree, MarksTheCellsThatAreTouched) {
 }
 
 TEST(ExactTree, WallsOfLargeTrianglesHaveLargeLeaves) {
-    const Page page(test::boxMesh({3, 3, 3}, {29, 29, 29}, 1), {0, 0, 0});
+    const TreePage page(test::boxMesh({3, 3, 3}, {29, 29, 29}, 1), {0, 0, 0});
     PageTree tree = page.tree();
     EXPECT_LE(expectSound(page, tree), kExactLeafTriangles);
     EXPECT_LE(tree.hard.size(), 64u);
@@ -160,7 +160,7 @@ TEST(ExactTree, SoupsOfNeedlesAreNotRepeatedForEver) {
     for (const bool adversarial : {false, true}) {
         IndexedMesh mesh = test::randomTriangles(400, 7, adversarial);
         for (glm::dvec3& p : mesh.positions) p = glm::dvec3(1) + p * 30.0;
-        const Page page(mesh, {0, 0, 0});
+        const TreePage page(mesh, {0, 0, 0});
         PageTree tree = page.tree();
         expectSound(page, tree);
         expectStored(page, tree);
@@ -179,7 +179,7 @@ TEST(ExactTree, FansAndCrowdsEndAtTheSmallestLeaf) {
     IndexedMesh crowd = test::randomTriangles(9000, 3, false);
     for (glm::dvec3& p : crowd.positions) p = glm::dvec3(10.01) + p * 0.05;
     for (const IndexedMesh& mesh : {fan, crowd}) {
-        const Page page(mesh, {0, 0, 0});
+        const TreePage page(mesh, {0, 0, 0});
         PageTree tree = page.tree();
         EXPECT_GT(expectSound(page, tree), kExactLeafTriangles);
         expectStored(page, tree);
@@ -187,14 +187,14 @@ TEST(ExactTree, FansAndCrowdsEndAtTheSmallestLeaf) {
 }
 
 TEST(ExactTree, AsManyRecordsAsAPageCanName) {
-    const Page page(bumpyTorus(), {0, 0, 0});
+    const TreePage page(bumpyTorus(), {0, 0, 0});
     const size_t free = page.tree().records(), triangles = [&] {
-        const PageTree one = buildExactTree(page.mesh, page.numbers, page.at, kLog2Cells, 0);
+        const PageTree one = buildExactTree(page.mesh, page.numbers, page.at, kTreeLog2Cells, 0);
         EXPECT_EQ(one.hard.size(), 1u);
         return one.hard[0].triangles.size();
     }();
     for (const size_t most : {free - 1, free / 2, triangles + triangles / 254 + 2}) {
-        PageTree tree = buildExactTree(page.mesh, page.numbers, page.at, kLog2Cells, most);
+        PageTree tree = buildExactTree(page.mesh, page.numbers, page.at, kTreeLog2Cells, most);
         EXPECT_LE(tree.records(), most);
         expectSound(page, tree);
         expectStored(page, tree);
@@ -202,7 +202,7 @@ TEST(ExactTree, AsManyRecordsAsAPageCanName) {
 }
 
 TEST(ExactTree, APageWithoutTrianglesIsEmpty) {
-    const Page page(test::sphereMesh({12, 12, 12}, 6, 12), {1, 1, 1});
+    const TreePage page(test::sphereMesh({12, 12, 12}, 6, 12), {1, 1, 1});
     PageTree tree = page.tree();
     ASSERT_EQ(tree.nodes.size(), 1u);
     EXPECT_EQ(tree.nodes[0].kind, TreeNode::Kind::Empty);
@@ -211,11 +211,11 @@ TEST(ExactTree, APageWithoutTrianglesIsEmpty) {
 
 TEST(ExactTree, TrianglesAroundThePageChangeNothing) {
     const IndexedMesh mesh = bumpyTorus();
-    const Page page(mesh, {0, 0, 0});
-    const TriangleBins bins = binTriangles(page.mesh, {kLog2Cells, 1}, kExactMarginCells, 0, 1);
+    const TreePage page(mesh, {0, 0, 0});
+    const TriangleBins bins = binTriangles(page.mesh, {kTreeLog2Cells, 1}, kExactMarginCells, 0, 1);
     ASSERT_EQ(bins.pages.size(), 1u);
     ASSERT_LT(bins.triangles.size(), page.numbers.size());
-    PageTree few = buildExactTree(page.mesh, bins.of(0), page.at, kLog2Cells), all = page.tree();
+    PageTree few = buildExactTree(page.mesh, bins.of(0), page.at, kTreeLog2Cells), all = page.tree();
     EXPECT_EQ(pageOf(encodePage(few, page.mesh).draft), pageOf(encodePage(all, page.mesh).draft));
 }
 

@@ -21,23 +21,23 @@
 namespace vcp {
 namespace {
 
-constexpr uint32_t kLog2Cells = 5;
-constexpr int kCells = 1 << kLog2Cells;
+constexpr uint32_t kPageLog2Cells = 5;
+constexpr int kCells = 1 << kPageLog2Cells;
 constexpr double kTolerance = 0.08;
 
 /// A mesh and one page of it, of two levels of pages (64 cells).
-struct Page {
+struct MeshPage {
     LatticeMesh mesh;
     TriangleBins bins;
     glm::u32vec3 at;
     std::optional<PageGeometry> geometry;
 
-    Page(LatticeMesh m, glm::u32vec3 position, uint32_t level = 1)
-        : mesh(std::move(m)), bins(binTriangles(mesh, {kLog2Cells, level})), at(position) {
+    MeshPage(LatticeMesh m, glm::u32vec3 position, uint32_t level = 1)
+        : mesh(std::move(m)), bins(binTriangles(mesh, {kPageLog2Cells, level})), at(position) {
         const auto page = std::find(bins.pages.begin(), bins.pages.end(), mortonEncode(at));
         const auto triangles =
             page == bins.pages.end() ? std::span<const uint32_t>() : bins.of(size_t(page - bins.pages.begin()));
-        geometry.emplace(mesh, triangles, at, kLog2Cells);
+        geometry.emplace(mesh, triangles, at, kPageLog2Cells);
     }
     [[nodiscard]] Triangle3 triangle(size_t k) const {
         Triangle3 t;
@@ -72,7 +72,7 @@ TEST(PageGeometry, CornersOfOccupiedCellsAreExact) {
     for (uint64_t seed = 0; seed < 4; ++seed) {
         const LatticeMesh mesh = mixedMesh(seed);
         for (const glm::u32vec3 at : {glm::u32vec3(0, 0, 0), glm::u32vec3(1, 0, 1)}) {
-            Page page(mesh, at);
+            MeshPage page(mesh, at);
             std::mt19937 random{uint32_t(seed)};
             for (int z = 0; z < kCells; ++z)
                 for (int y = 0; y < kCells; ++y)
@@ -107,7 +107,7 @@ TEST(PageGeometry, CornersOfOccupiedCellsAreExact) {
 // What two pages say of a corner that they share is the same: no crack between them.
 TEST(PageGeometry, NeighbouringPagesAgreeOnCorners) {
     const LatticeMesh mesh = mixedMesh(3);
-    Page left(mesh, {0, 0, 0}), right(mesh, {1, 0, 0});
+    MeshPage left(mesh, {0, 0, 0}), right(mesh, {1, 0, 0});
     int compared = 0;
     for (int z = 0; z < kCells; ++z)
         for (int y = 0; y < kCells; ++y) {
@@ -123,7 +123,7 @@ TEST(PageGeometry, NeighbouringPagesAgreeOnCorners) {
 }
 
 TEST(PageGeometry, OccupancyIsTouch) {
-    Page page(mixedMesh(2), {0, 0, 0});
+    MeshPage page(mixedMesh(2), {0, 0, 0});
     std::vector<uint8_t> touched(kCells * kCells * kCells, 0), near(touched);
     Polygon polygon;
     for (size_t k = 0; k < page.mesh.triangles.size(); ++k) {
@@ -159,7 +159,7 @@ TEST(PageGeometry, TrianglesOnCellWallsAreInBothCells) {
     IndexedMesh plate;
     plate.positions = {{10, 4, 4}, {10, 8, 4}, {10, 4, 8}};
     plate.triangles = {{0, 1, 2}};
-    Page page(test::onLattice(plate), {0, 0, 0});
+    MeshPage page(test::onLattice(plate), {0, 0, 0});
     EXPECT_TRUE(page.geometry->occupied({9, 4, 4}));
     EXPECT_TRUE(page.geometry->occupied({10, 4, 4}));
     EXPECT_TRUE(page.geometry->occupied({10, 3, 4})) << "it touches the wall between them, too";
@@ -173,7 +173,7 @@ TEST(PageGeometry, TrianglesOnCellWallsAreInBothCells) {
 }
 
 TEST(PageGeometry, TrianglesOfBoxesAndFiltersAgree) {
-    Page page(mixedMesh(1), {0, 0, 0});
+    MeshPage page(mixedMesh(1), {0, 0, 0});
     std::mt19937 random(1);
     std::vector<uint32_t> around, inside, filteredAround, filteredInside, all(page.bins.triangles.size());
     for (int i = 0; i < 300; ++i) {
@@ -194,7 +194,7 @@ TEST(PageGeometry, TrianglesOfBoxesAndFiltersAgree) {
 }
 
 /// What every tree must be.
-void expectSound(Page& page, const PageTree& tree) {
+void expectSound(MeshPage& page, const PageTree& tree) {
     using Kind = TreeNode::Kind;
     std::vector<int> parents(tree.nodes.size(), 0);
     std::vector<uint8_t> covered(kCells * kCells * kCells, 0);
@@ -250,7 +250,7 @@ void expectSound(Page& page, const PageTree& tree) {
 }
 
 /// Every triangle of a hard leaf's box is in its list.
-void expectHardLeavesComplete(Page& page, const PageTree& tree, std::span<const uint32_t> binned) {
+void expectHardLeavesComplete(MeshPage& page, const PageTree& tree, std::span<const uint32_t> binned) {
     Polygon polygon;
     for (const HardLeaf& leaf : tree.hard) {
         const std::set<uint32_t> listed(leaf.triangles.begin(), leaf.triangles.end());
@@ -297,7 +297,7 @@ TEST(PageBuilder, MixedMeshes) {
         for (uint32_t octant = 0; octant < 8; ++octant) {
             SCOPED_TRACE(testing::Message() << "seed " << seed << " page " << octant);
             const glm::u32vec3 at(octant & 1, octant >> 1 & 1, octant >> 2);
-            Page page(mesh, at);
+            MeshPage page(mesh, at);
             PageTree tree = buildPageTree(*page.geometry, kTolerance);
             ASSERT_NO_FATAL_FAILURE(expectSound(page, tree));
             const auto number = std::find(page.bins.pages.begin(), page.bins.pages.end(), mortonEncode(at));
@@ -342,7 +342,7 @@ using Corner = std::tuple<double, double, double, uint32_t, uint32_t>;
 
 TEST(PageEncoder, LeavesComeBack) {
     for (uint64_t seed = 0; seed < 3; ++seed) {
-        Page page(mixedMesh(seed), {0, 0, 0});
+        MeshPage page(mixedMesh(seed), {0, 0, 0});
         page.mesh.colours.resize(page.mesh.positions.size());
         for (size_t v = 0; v < page.mesh.colours.size(); ++v) page.mesh.colours[v] = uint32_t(v * 2654435761u);
         PageTree tree = buildPageTree(*page.geometry, kTolerance);
@@ -403,7 +403,7 @@ TEST(PageBuilder, PagesAreStoredCoded) {
                                                      {test::boxMesh({5, 6, 7}, {20, 21, 24}, 12), 4},
                                                      {soup, 2}};
     for (const auto& [mesh, factor] : scenes) {
-        Page page(test::onLattice(mesh), {0, 0, 0});
+        MeshPage page(test::onLattice(mesh), {0, 0, 0});
         PageTree tree = buildPageTree(*page.geometry, kTolerance);
         const EncodedPage encoded = encodePage(tree, page.mesh);
         ASSERT_GT(encoded.leaves, 100u);
@@ -426,7 +426,7 @@ TEST(PageBuilder, LongTrianglesStayWithinWhatAPageCanName) {
             mesh.positions.push_back(p);
         mesh.triangles.push_back({3 * k, 3 * k + 1, 3 * k + 2});
     }
-    Page page(test::onLattice(mesh), {0, 0, 0});
+    MeshPage page(test::onLattice(mesh), {0, 0, 0});
     const size_t free = buildPageTree(*page.geometry, kTolerance).records();
     for (const size_t most : {free, free - 1, free / 4, size_t{600}, size_t{301}}) {
         const PageTree tree = buildPageTree(*page.geometry, kTolerance, most);
@@ -444,7 +444,7 @@ TEST(PageBuilder, WorkGrowsWithTheTriangles) {
 }
 
 TEST(PageBuilder, EmptyPage) {
-    Page page(test::onLattice(test::sphereMesh({12, 12, 12}, 6, 12)), {1, 1, 1});
+    MeshPage page(test::onLattice(test::sphereMesh({12, 12, 12}, 6, 12)), {1, 1, 1});
     PageTree tree = buildPageTree(*page.geometry, kTolerance);
     EXPECT_EQ(tree.nodes.size(), 1u);
     EXPECT_EQ(tree.nodes[0].kind, TreeNode::Kind::Empty);
@@ -457,7 +457,7 @@ TEST(PageBuilder, FlatWallCostsFewLeaves) {
     mesh.positions = {{-20, -20, 13.3}, {90, -20, 13.3}, {90, 90, 13.3}, {-20, 90, 13.3}};
     mesh.triangles = {{0, 1, 2}, {0, 2, 3}};
     for (glm::dvec3& p : mesh.positions) p += glm::dvec3(64, 64, 64);
-    Page page(test::onLattice(mesh), {2, 2, 2}, 2);
+    MeshPage page(test::onLattice(mesh), {2, 2, 2}, 2);
     PageTree tree = buildPageTree(*page.geometry, kTolerance);
     expectSound(page, tree);
     EXPECT_EQ(tree.hard.size(), 0u);
@@ -476,7 +476,7 @@ TEST(PageBuilder, DenseFanDoesNotExplode) {
                                 12.0 * glm::dvec3(std::cos(a), std::sin(a), 0.4 * std::sin(20 * a)));
     }
     for (uint32_t i = 0; i < kNeedles; ++i) fan.triangles.push_back({0, 1 + i, 1 + (i + 1) % kNeedles});
-    Page page(test::onLattice(fan), {0, 0, 0});
+    MeshPage page(test::onLattice(fan), {0, 0, 0});
     PageTree tree = buildPageTree(*page.geometry, kTolerance);
     expectSound(page, tree);
     size_t records = 0, centre = 0;
@@ -501,7 +501,7 @@ TEST(PageBuilder, CrowdedCellsAreSplit) {
     std::uniform_real_distribution<double> unit(-1, 1);
     IndexedMesh mesh = test::boxMesh(glm::dvec3(13), glm::dvec3(19), 30);
     for (glm::dvec3& p : mesh.positions) p += 0.04 * glm::dvec3(unit(random), unit(random), unit(random));
-    Page page(test::onLattice(mesh), {0, 0, 0}, 0);
+    MeshPage page(test::onLattice(mesh), {0, 0, 0}, 0);
     PageTree tree = buildPageTree(*page.geometry, 0.002);
     size_t crowded = 0, small = 0;
     for (const HardLeaf& leaf : tree.hard) {
@@ -515,7 +515,7 @@ TEST(PageBuilder, CrowdedCellsAreSplit) {
 
 TEST(PageBuilder, IsDeterministic) {
     const LatticeMesh mesh = mixedMesh(4);
-    Page a(mesh, {0, 1, 0}), b(mesh, {0, 1, 0});
+    MeshPage a(mesh, {0, 1, 0}), b(mesh, {0, 1, 0});
     PageTree ta = buildPageTree(*a.geometry, kTolerance), tb = buildPageTree(*b.geometry, kTolerance);
     EXPECT_EQ(pageOf(encodePage(ta, a.mesh).draft), pageOf(encodePage(tb, b.mesh).draft));
 }

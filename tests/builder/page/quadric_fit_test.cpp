@@ -12,7 +12,7 @@
 namespace vcp {
 namespace {
 
-struct Points {
+struct FittedPoints {
     std::vector<float> x, y, z;
 
     void add(glm::dvec3 p) {
@@ -48,7 +48,7 @@ glm::dvec3 pointOver(const Axes& axes, double a, double b, const Height& height)
 
 /// Mean square of what is left of the heights when they and the terms have been made orthogonal to all terms before
 /// (Gram and Schmidt, twice, point by point). `ridge`: times the coefficients' squares, is added to what is least.
-double referenceSquare(const Points& points, glm::dvec3 n, double ridge) {
+double referenceSquare(const FittedPoints& points, glm::dvec3 n, double ridge) {
     const Axes axes = axesAcross(n);
     const size_t count = points.x.size();
     std::array<std::vector<double>, 7> column;  // the last: heights
@@ -87,7 +87,7 @@ TEST(QuadricFit, AgreesWithAFitInDouble) {
         std::uniform_real_distribution<double> half(-0.5, 0.5);
         const Axes axes = axesAcross(unitVector(random));
         const double noise = std::pow(10.0, -4 + double(seed % 4)), wave = 3 * half(random), bend = half(random);
-        Points points;
+        FittedPoints points;
         for (size_t count = 8 * (2 + random() % 30); count > 0; --count)
             points.add(pointOver(axes, half(random), half(random), [&](double a, double b) {
                 return bend * a * b + 0.1 * std::sin(wave * 5 * a) + noise * half(random);
@@ -109,7 +109,7 @@ TEST(QuadricFit, LeavesNothingOfAQuadric) {
         const Axes axes = axesAcross(unitVector(random));
         double c[6];
         for (double& k : c) k = half(random);
-        Points points;
+        FittedPoints points;
         for (int i = 0; i < 64; ++i)
             points.add(pointOver(axes, half(random), half(random), [&](double a, double b) {
                 return c[0] + c[1] * a + c[2] * b + c[3] * a * a + c[4] * a * b + c[5] * b * b;
@@ -124,7 +124,7 @@ TEST(QuadricFit, LeavesTheKnownPartOfACubic) {
     for (const glm::dvec3 n :
          {glm::dvec3(0, 0, 1), glm::dvec3(0, -1, 0), glm::dvec3(1, 0, 0), glm::normalize(glm::dvec3(1, 2, -3))}) {
         const Axes axes = axesAcross(n);
-        Points points;
+        FittedPoints points;
         constexpr int kSteps = 64;
         for (int j = 0; j < kSteps; ++j)
             for (int i = 0; i < kSteps; ++i)
@@ -139,7 +139,7 @@ TEST(QuadricFit, PointsThatDetermineNoQuadric) {
     std::uniform_real_distribution<double> half(-0.5, 0.5);
     const Axes axes = axesAcross(unitVector(random));
     const auto flat = [](double, double) { return 0.25; };
-    Points one, line, sheets;
+    FittedPoints one, line, sheets;
     const double a = half(random), b = half(random);
     for (int i = 0; i < 32; ++i) {
         one.add(pointOver(axes, a, b, flat));

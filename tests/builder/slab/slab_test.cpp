@@ -19,17 +19,17 @@
 namespace vcp {
 namespace {
 
-constexpr uint32_t kLog2Cells = 4;
-constexpr double kEdge = 1 << kLog2Cells;
+constexpr uint32_t kSlabLog2Cells = 4;
+constexpr double kEdge = 1 << kSlabLog2Cells;
 
 /// A mesh over the eight pages below one, in cells of the finer level.
-struct Scene {
+struct SlabScene {
     const char* name;
     LatticeMesh mesh;
 };
 
-std::vector<Scene> scenes() {
-    std::vector<Scene> all;
+std::vector<SlabScene> scenes() {
+    std::vector<SlabScene> all;
     all.push_back({"sphere", test::onLattice(test::sphereMesh(glm::dvec3(kEdge * 1.02), kEdge * 0.7, 24))});
     IndexedMesh soup = test::randomTriangles(300, 5, true);
     for (glm::dvec3& p : soup.positions) p = (0.9 * p + 0.05) * 2.0 * kEdge;
@@ -96,30 +96,30 @@ bool holds(const PageTree& tree, glm::dvec3 p) {
     return false;
 }
 
-struct Pages {
+struct FoldedPages {
     std::vector<PageSurface> finest;  ///< the eight, in octant order, empty ones left out
     std::vector<uint32_t> octants;
     PageSurface above;
 };
 
-Pages pagesOf(const LatticeMesh& mesh) {
-    Pages pages;
+FoldedPages pagesOf(const LatticeMesh& mesh) {
+    FoldedPages pages;
     const std::vector<uint32_t> numbers = allOf(mesh);
     for (uint32_t o = 0; o < 8; ++o) {
-        PageSurface surface = surfaceOf(mesh, numbers, mortonDecode(o), kLog2Cells);
+        PageSurface surface = surfaceOf(mesh, numbers, mortonDecode(o), kSlabLog2Cells);
         if (surface.cells.size() == 0) continue;
         pages.finest.push_back(std::move(surface));
         pages.octants.push_back(o);
     }
-    pages.above = foldPages(pages.finest, pages.octants, kLog2Cells);
+    pages.above = foldPages(pages.finest, pages.octants, kSlabLog2Cells);
     return pages;
 }
 
 TEST(Slabs, HoldEveryPointOfTheSurface) {
     for (const auto& [name, mesh] : scenes()) {
         SCOPED_TRACE(name);
-        const Pages pages = pagesOf(mesh);
-        const PageTree tree = buildSlabTree(pages.above, kLog2Cells);
+        const FoldedPages pages = pagesOf(mesh);
+        const PageTree tree = buildSlabTree(pages.above, kSlabLog2Cells);
         std::mt19937 random(7);
         for (int i = 0; i < 3000; ++i) {
             const glm::dvec3 p = pointOf(mesh, random() % mesh.triangles.size(), random);
@@ -145,7 +145,7 @@ TEST(Slabs, CellsHaveTheAreaOfTheMesh) {
             const glm::dvec3 a(mesh.positions[t[0]]), b(mesh.positions[t[1]]), c(mesh.positions[t[2]]);
             expected += glm::length(glm::cross(b - a, c - a)) / 2 / kLatticePerCell / kLatticePerCell;
         }
-        const Pages pages = pagesOf(mesh);
+        const FoldedPages pages = pagesOf(mesh);
         double finest = 0, above = 0;
         for (const PageSurface& page : pages.finest)
             for (const CellSurface& cell : page.cells.cells) finest += double(cell.area);
@@ -171,8 +171,8 @@ std::optional<glm::dvec3> drawnPoint(const SlabLeaf& leaf, std::mt19937& random)
 TEST(Slabs, WhatIsDrawnIsWithinTheCertifiedErrorOfTheMesh) {
     for (const auto& [name, mesh] : scenes()) {
         SCOPED_TRACE(name);
-        const Pages pages = pagesOf(mesh);
-        const PageTree tree = buildSlabTree(pages.above, kLog2Cells);
+        const FoldedPages pages = pagesOf(mesh);
+        const PageTree tree = buildSlabTree(pages.above, kSlabLog2Cells);
         EXPECT_LE(tree.certifiedError(), std::max(kMostSlabError, kAnySlabError / 2));
         EXPECT_TRUE(tree.hard.empty() && tree.soft.empty());
         const IndexedMesh inCells = test::inCells(mesh, 0.5);
@@ -204,7 +204,7 @@ TEST(Slabs, AFlatSurfaceHasThinSlabsAlongItsNormal) {
     for (int i = 0; i < 4; ++i)
         mesh.positions.push_back(glm::dvec3(kEdge) + 12.0 * ((i & 1) != 0 ? u : -u) + 12.0 * ((i & 2) != 0 ? v : -v));
     mesh.triangles = {{0, 1, 2}, {1, 3, 2}};
-    const PageTree tree = buildSlabTree(pagesOf(test::onLattice(mesh)).above, kLog2Cells);
+    const PageTree tree = buildSlabTree(pagesOf(test::onLattice(mesh)).above, kSlabLog2Cells);
     ASSERT_GT(tree.slabs.size(), 100u);
     for (const SlabLeaf& leaf : tree.slabs) {
         EXPECT_GT(std::abs(glm::dot(f64::decodeDirection(leaf.code >> kSlabDirectionShift), normal)), std::cos(0.01));
@@ -253,14 +253,14 @@ TEST(Slabs, ExtentsAreThoseOfTheBoxCutByTheSlab) {
 }
 
 TEST(Slabs, APageCutPartByPartIsTheSame) {
-    for (const Scene& scene : scenes()) {
+    for (const SlabScene& scene : scenes()) {
         SCOPED_TRACE(scene.name);
         for (uint32_t octant = 0; octant < 8; ++octant) {
             const glm::u32vec3 page(octant & 1, octant >> 1 & 1, octant >> 2);
-            const StoredPage whole = storedSurface(surfaceOf(scene.mesh, allOf(scene.mesh), page, kLog2Cells));
+            const StoredPage whole = storedSurface(surfaceOf(scene.mesh, allOf(scene.mesh), page, kSlabLog2Cells));
             for (const size_t pieces : {size_t{0}, size_t{20}}) {
                 const StoredPage parts =
-                    storedSurface(surfaceOf(scene.mesh, allOf(scene.mesh), page, kLog2Cells, pieces));
+                    storedSurface(surfaceOf(scene.mesh, allOf(scene.mesh), page, kSlabLog2Cells, pieces));
                 ASSERT_EQ(whole.geometry, parts.geometry) << octant << ", " << pieces << " pieces";
                 ASSERT_EQ(whole.colour, parts.colour) << octant << ", " << pieces << " pieces";
             }
@@ -269,7 +269,7 @@ TEST(Slabs, APageCutPartByPartIsTheSame) {
 }
 
 TEST(Slabs, SurfacesComeBackFromTheirBytes) {
-    const Pages pages = pagesOf(scenes()[0].mesh);
+    const FoldedPages pages = pagesOf(scenes()[0].mesh);
     const SurfaceCells& cells = pages.above.cells;
     const SurfaceCells again = surfaceCellsFrom(bytesOf(cells));
     EXPECT_EQ(again.codes, cells.codes);

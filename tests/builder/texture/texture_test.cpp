@@ -18,7 +18,7 @@
 namespace vcp {
 namespace {
 
-Rgba8 rgba(unsigned r, unsigned g, unsigned b, unsigned a = 255) { return r | g << 8 | b << 16 | a << 24; }
+Rgba8 texelOf(unsigned r, unsigned g, unsigned b, unsigned a = 255) { return r | g << 8 | b << 16 | a << 24; }
 
 Image noise(uint32_t width, uint32_t height, unsigned seed) {
     std::mt19937 random(seed);
@@ -78,7 +78,7 @@ TEST(Image, DecodesPngExactlyAndJpegNearly) {
     const auto png = decodeImage(pngOf(image));
     ASSERT_TRUE(png.ok()) << png.error().line();
     EXPECT_EQ(png->texels, image.texels);
-    Image flat{32, 8, std::vector<Rgba8>(256, rgba(200, 100, 50))};
+    Image flat{32, 8, std::vector<Rgba8>(256, texelOf(200, 100, 50))};
     for (const bool progressive : {false, true}) {
         const auto jpeg = decodeImage(jpegOf(flat, progressive));
         ASSERT_TRUE(jpeg.ok()) << jpeg.error().line();
@@ -214,22 +214,22 @@ TEST(Texture, SamplesTexelCentresExactly) {
 }
 
 TEST(Texture, BlendsLightNotBytes) {
-    const Texture texture(Image{2, 1, {rgba(0, 0, 0), rgba(255, 255, 255)}}, Wrap::Clamp, Wrap::Clamp);
+    const Texture texture(Image{2, 1, {texelOf(0, 0, 0), texelOf(255, 255, 255)}}, Wrap::Clamp, Wrap::Clamp);
     EXPECT_EQ(texture.sample({0.5f, 0.5f}, {}) & 0xFF, 188u);  // half the light
     EXPECT_EQ(texture.sample({0.5f, 0.5f}, TextureFootprint::round(10)) & 0xFF, 188u) << "the coarsest level";
 }
 
 TEST(Texture, WrapModes) {
-    const Image image{2, 1, {rgba(255, 0, 0), rgba(0, 0, 255)}};
+    const Image image{2, 1, {texelOf(255, 0, 0), texelOf(0, 0, 255)}};
     const auto at = [&](float u, Wrap wrap) { return Texture(image, wrap, wrap).sample({u, 0.5f}, {}); };
     for (const float period : {-2.0f, 0.0f, 6.0f}) {
-        EXPECT_EQ(at(0.25f + period, Wrap::Repeat), rgba(255, 0, 0));
-        EXPECT_EQ(at(0.25f + period, Wrap::Mirror), rgba(255, 0, 0));
-        EXPECT_EQ(at(1.25f + period, Wrap::Repeat), rgba(255, 0, 0));
-        EXPECT_EQ(at(1.25f + period, Wrap::Mirror), rgba(0, 0, 255));
+        EXPECT_EQ(at(0.25f + period, Wrap::Repeat), texelOf(255, 0, 0));
+        EXPECT_EQ(at(0.25f + period, Wrap::Mirror), texelOf(255, 0, 0));
+        EXPECT_EQ(at(1.25f + period, Wrap::Repeat), texelOf(255, 0, 0));
+        EXPECT_EQ(at(1.25f + period, Wrap::Mirror), texelOf(0, 0, 255));
     }
-    EXPECT_EQ(at(-7, Wrap::Clamp), rgba(255, 0, 0));
-    EXPECT_EQ(at(7, Wrap::Clamp), rgba(0, 0, 255));
+    EXPECT_EQ(at(-7, Wrap::Clamp), texelOf(255, 0, 0));
+    EXPECT_EQ(at(7, Wrap::Clamp), texelOf(0, 0, 255));
     for (const float far : {1e30f, -3e38f}) EXPECT_NE(at(far, Wrap::Repeat), 0u) << "finite, however far";
 }
 
@@ -248,7 +248,7 @@ TEST(Texture, LongFootprintsAreAveragedAlongAndNotAcross) {
     // Columns of 8 texels, black and white in turn.
     Image image{64, 64, {}};
     for (uint32_t y = 0; y < 64; ++y)
-        for (uint32_t x = 0; x < 64; ++x) image.texels.push_back(x / 8 % 2 == 0 ? rgba(0, 0, 0) : kWhite);
+        for (uint32_t x = 0; x < 64; ++x) image.texels.push_back(x / 8 % 2 == 0 ? texelOf(0, 0, 0) : kWhite);
     const Texture texture(std::move(image));
     const double length = 32.0 / 64, width = 1.0 / 64;
     const glm::vec2 inWhite(12.0f / 64, 0.5f);
@@ -268,8 +268,8 @@ TEST(Texture, FootprintsOfPicturesThatAreNotSquareAreInTheirOwnTexels) {
     // 4 texels wide and 64 high, one row in turn black: an eighth of the height is 8 rows, and half a column.
     Image image{4, 64, {}};
     for (uint32_t y = 0; y < 64; ++y)
-        for (uint32_t x = 0; x < 4; ++x) image.texels.push_back(y % 2 == 0 ? rgba(0, 0, 0) : kWhite);
-    for (uint32_t y = 0; y < 64; ++y) image.texels[4 * y] = rgba(255, 0, 0);
+        for (uint32_t x = 0; x < 4; ++x) image.texels.push_back(y % 2 == 0 ? texelOf(0, 0, 0) : kWhite);
+    for (uint32_t y = 0; y < 64; ++y) image.texels[4 * y] = texelOf(255, 0, 0);
     const Texture texture(std::move(image), Wrap::Clamp, Wrap::Clamp);
     const Rgba8 seen = texture.sample({2.5f / 4, 0.5f}, TextureFootprint::round(0.125));
     EXPECT_NEAR(lightOfByte()[seen & 0xFF], 0.5, 0.05);
@@ -300,15 +300,15 @@ TEST(Texture, ACornersFootprintIsThatOfItsTriangle) {
 
 TEST(Texture, HugeFootprintsAndPlacesAreTheMean) {
     Image image{8, 8, {}};
-    for (uint32_t i = 0; i < 64; ++i) image.texels.push_back(i % 2 == 0 ? rgba(0, 0, 0) : kWhite);
+    for (uint32_t i = 0; i < 64; ++i) image.texels.push_back(i % 2 == 0 ? texelOf(0, 0, 0) : kWhite);
     const Texture texture(std::move(image));
     for (const double width : {1e3, 1e30, 1e150})
         EXPECT_NEAR(lightOfByte()[texture.sample({1e20f, -3e7f}, TextureFootprint::round(width)) & 0xFF], 0.5, 0.02);
 }
 
 TEST(Texture, WhatIsTransparentLendsNoColour) {
-    const Texture texture(Image{2, 1, {rgba(255, 0, 0, 255), rgba(0, 255, 0, 0)}}, Wrap::Clamp, Wrap::Clamp);
-    EXPECT_EQ(texture.sample({0.5f, 0.5f}, {}), rgba(255, 0, 0, 128));
+    const Texture texture(Image{2, 1, {texelOf(255, 0, 0, 255), texelOf(0, 255, 0, 0)}}, Wrap::Clamp, Wrap::Clamp);
+    EXPECT_EQ(texture.sample({0.5f, 0.5f}, {}), texelOf(255, 0, 0, 128));
 }
 
 TEST(TextureCache, LoadsOnDemandAndForgetsTheLeastRecentlyUsed) {
@@ -316,7 +316,7 @@ TEST(TextureCache, LoadsOnDemandAndForgetsTheLeastRecentlyUsed) {
     for (unsigned i = 0; i < 3; ++i) {
         materials[i].name = std::to_string(i);
         materials[i].image.bytes =
-            std::make_shared<const std::string>(pngOf(Image{16, 16, std::vector<Rgba8>(256, rgba(i, i, i))}));
+            std::make_shared<const std::string>(pngOf(Image{16, 16, std::vector<Rgba8>(256, texelOf(i, i, i))}));
     }
     materials[3].name = "broken";
     materials[3].image.path = "/nowhere/picture.png";
@@ -336,7 +336,7 @@ TEST(TextureCache, LoadsOnDemandAndForgetsTheLeastRecentlyUsed) {
 
 TEST(ColourEncoding, RoundTripsAndModulates) {
     for (unsigned i = 0; i < 256; ++i) EXPECT_EQ(toByte(linearToSrgb(srgbToLinear(i / 255.0))), i);
-    EXPECT_EQ(modulate(rgba(255, 128, 0, 255), rgba(128, 128, 200, 255)), rgba(128, 64, 0, 255));
+    EXPECT_EQ(modulate(texelOf(255, 128, 0, 255), texelOf(128, 128, 200, 255)), texelOf(128, 64, 0, 255));
     EXPECT_EQ(toByte(std::nan("")), 0);
 }
 
@@ -350,15 +350,15 @@ TEST(ColourEncoding, TablesSayWhatTheFormulasDo) {
 
 TEST(ColourEncoding, MeansAreOfLight) {
     LightMean mean;
-    mean.add(rgba(0, 255, 16, 0));
-    mean.add(rgba(0, 0, 49, 255));
+    mean.add(texelOf(0, 255, 16, 0));
+    mean.add(texelOf(0, 0, 49, 255));
     const double green = linearToSrgb(0.5),
                  blue = linearToSrgb((srgbToLinear(16 / 255.0) + srgbToLinear(49 / 255.0)) / 2);
-    EXPECT_EQ(mean.mean(), rgba(0, toByte(green), toByte(blue), 128));
+    EXPECT_EQ(mean.mean(), texelOf(0, toByte(green), toByte(blue), 128));
     for (unsigned i = 0; i < 256; ++i) {
         LightMean same;
-        for (int k = 0; k < 3; ++k) same.add(rgba(i, 255 - i, i, i));
-        EXPECT_EQ(same.mean(), rgba(i, 255 - i, i, i));
+        for (int k = 0; k < 3; ++k) same.add(texelOf(i, 255 - i, i, i));
+        EXPECT_EQ(same.mean(), texelOf(i, 255 - i, i, i));
     }
 }
 

@@ -19,9 +19,9 @@ namespace {
 
 using test::LevelledImage, test::StoredImages;
 
-class MemoryFile final : public ByteReader {
+class TableFile final : public ByteReader {
 public:
-    explicit MemoryFile(std::vector<std::byte> content) : bytes(std::move(content)) {}
+    explicit TableFile(std::vector<std::byte> content) : bytes(std::move(content)) {}
     Result<void> read(uint64_t offset, std::span<std::byte> out) const override {
         if (offset > bytes.size() || out.size() > bytes.size() - offset)
             return Error{.code = ErrorCode::Io, .message = "read past the end", .file = name_};
@@ -79,7 +79,7 @@ protected:
     }
     /// Changes a byte of the tables, gives them their hash again, and expects one line with `words` and the byte.
     void expectRefused(uint64_t byte, uint8_t value, const std::string& words) const {
-        MemoryFile file(bytes_);
+        TableFile file(bytes_);
         ImagesPlace place = this->place();
         const uint64_t at = place.offset + byte;
         ASSERT_NE(file.bytes[at], std::byte{value}) << words;
@@ -101,7 +101,7 @@ protected:
 };
 
 TEST_F(ImageFile, IsReadBack) {
-    const MemoryFile file(bytes_);
+    const TableFile file(bytes_);
     ASSERT_TRUE(verifyFile(file).ok()) << verifyFile(file).error().line();
     const auto dataset = readDataset(file);
     ASSERT_TRUE(dataset.ok());
@@ -125,7 +125,7 @@ TEST_F(ImageFile, IsReadBack) {
 }
 
 TEST_F(ImageFile, TakesNoMoreMemoryThanItMay) {
-    const MemoryFile file(bytes_);
+    const TableFile file(bytes_);
     // 140 + 35 + 17 + 8 + 4 + 2 + 1 texels, 15 + 2 + 1, and 1.
     const auto all = ImageSet::read(file, place(), 226 * 4);
     EXPECT_EQ(all->bytes(), 226u * 4);
@@ -140,13 +140,13 @@ TEST_F(ImageFile, TakesNoMoreMemoryThanItMay) {
 
 TEST_F(ImageFile, EveryTruncationIsFound) {
     for (size_t bytes = 0; bytes < bytes_.size(); ++bytes) {
-        const MemoryFile file({bytes_.begin(), bytes_.begin() + std::ptrdiff_t(bytes)});
+        const TableFile file({bytes_.begin(), bytes_.begin() + std::ptrdiff_t(bytes)});
         ASSERT_FALSE(verifyFile(file).ok()) << bytes;
     }
 }
 
 TEST_F(ImageFile, EveryBitFlipIsFound) {
-    MemoryFile file(bytes_);
+    TableFile file(bytes_);
     for (size_t bit = 0; bit < 8 * bytes_.size(); ++bit) {
         // Of the padding within the header a few bits stand for all.
         if (bit / 8 >= sizeof(FileHeader) && bit / 8 < place().offset && bit % 64 != 3) continue;
@@ -157,7 +157,7 @@ TEST_F(ImageFile, EveryBitFlipIsFound) {
 }
 
 TEST_F(ImageFile, AWrongTileIsNamed) {
-    MemoryFile file(bytes_);
+    TableFile file(bytes_);
     const uint64_t first = place().offset + stored_.tables.bytes();
     file.bytes[first] ^= std::byte{1};
     const auto verified = verifyFile(file);
@@ -200,7 +200,7 @@ TEST_F(ImageFile, AWrongPlaceIsRefused) {
     EXPECT_NE(wrong([](ImagesPlace& p) { p.bytes = ~uint64_t{0}; }), "");
     EXPECT_NE(wrong([](ImagesPlace& p) { p.images = ~uint32_t{0}; }), "") << "more rows than bytes";
     // A claim of more tiles than there are bytes for is refused before anything is allocated by it.
-    MemoryFile file(bytes_);
+    TableFile file(bytes_);
     ImageRow row{kMaxImageEdge, kMaxImageEdge, 16, kLosslessTiles, 0};
     std::memcpy(file.bytes.data() + place().offset, &row, sizeof row);
     const auto tables = readImageTables(file, place());

@@ -146,11 +146,11 @@ private:
     uint64_t nodes_ = 0;
 };
 
-std::span<const std::byte> asBytes(const std::vector<uint4>& block) { return std::as_bytes(std::span(block)); }
+std::span<const std::byte> bytesOfBlock(const std::vector<uint4>& block) { return std::as_bytes(std::span(block)); }
 
 /// Parses; what is accepted is walked. True when accepted.
 bool parseAndWalk(const std::vector<uint4>& block) {
-    const auto page = parsePage(asBytes(block));
+    const auto page = parsePage(bytesOfBlock(block));
     if (!page) {
         EXPECT_EQ(page.error().code, ErrorCode::InvalidInput);
         EXPECT_FALSE(page.error().message.empty());
@@ -163,12 +163,12 @@ bool parseAndWalk(const std::vector<uint4>& block) {
 
 void expectRefused(const PageParts& parts, const std::string& words) {
     const std::vector<uint4> block = parts.bytes();
-    const auto page = parsePage(asBytes(block));
+    const auto page = parsePage(bytesOfBlock(block));
     ASSERT_FALSE(page.ok()) << "accepted, but should say: " << words;
     EXPECT_NE(page.error().line().find(words), std::string::npos) << page.error().line();
 }
 
-std::vector<Index3> trianglesOf(const PageView& page, size_t node) {
+std::vector<Index3> trianglesOfNode(const PageView& page, size_t node) {
     std::vector<Index3> triangles;
     forEachTriangle(page.strips, page.nodes[node], [&](const Index3& triangle) { triangles.push_back(triangle); });
     return triangles;
@@ -176,14 +176,14 @@ std::vector<Index3> trianglesOf(const PageView& page, size_t node) {
 
 TEST(Page, EveryKindOfNodeIsRead) {
     const std::vector<uint4> block = smallPage().bytes();
-    const auto page = parsePage(asBytes(block));
+    const auto page = parsePage(bytesOfBlock(block));
     ASSERT_TRUE(page.ok()) << page.error().line();
     EXPECT_EQ(PageWalk(*page).run(), 17u);
     EXPECT_EQ(page->nodes.size(), 16u);
     EXPECT_EQ(page->faces.size(), 4u);
     EXPECT_EQ(page->vertices.size(), 4u);
-    EXPECT_EQ(trianglesOf(*page, 3), (std::vector<Index3>{{0, 1, 2}, {0, 2, 3}}));
-    EXPECT_EQ(trianglesOf(*page, 15), (std::vector<Index3>{{0, 1, 3}, {2, 3, 1}, {2, 0, 3}}));
+    EXPECT_EQ(trianglesOfNode(*page, 3), (std::vector<Index3>{{0, 1, 2}, {0, 2, 3}}));
+    EXPECT_EQ(trianglesOfNode(*page, 15), (std::vector<Index3>{{0, 1, 3}, {2, 3, 1}, {2, 0, 3}}));
 }
 
 TEST(Page, EntriesAreLongWhereVerticesAreMany) {
@@ -194,10 +194,10 @@ TEST(Page, EntriesAreLongWhereVerticesAreMany) {
         p.entries[3] = stripEntry(2, vertices - 1);
         p.count();
         const std::vector<uint4> block = p.bytes();
-        const auto page = parsePage(asBytes(block));
+        const auto page = parsePage(bytesOfBlock(block));
         ASSERT_TRUE(page.ok()) << page.error().line();
-        EXPECT_EQ(trianglesOf(*page, 3), (std::vector<Index3>{{0, 1, 2}, {0, 2, vertices - 1}}));
-        EXPECT_EQ(trianglesOf(*page, 15), (std::vector<Index3>{{0, 1, 3}, {2, 3, 1}, {2, 0, 3}}));
+        EXPECT_EQ(trianglesOfNode(*page, 3), (std::vector<Index3>{{0, 1, 2}, {0, 2, vertices - 1}}));
+        EXPECT_EQ(trianglesOfNode(*page, 15), (std::vector<Index3>{{0, 1, 3}, {2, 3, 1}, {2, 0, 3}}));
         const PageSections s = pageSections(page->header);
         EXPECT_EQ(s.end - s.strips, vertices == kShortEntryVertices ? 32u : 48u);
     }
@@ -233,14 +233,14 @@ TEST(Page, EveryTruncationIsRefused) {
         // A copy of its own, so that a read behind the end is seen.
         std::vector<uint4> part((size + 15) / 16);
         if (size > 0) std::memcpy(part.data(), block.data(), size);
-        EXPECT_FALSE(parsePage(asBytes(part).first(size)).ok()) << size;
+        EXPECT_FALSE(parsePage(bytesOfBlock(part).first(size)).ok()) << size;
     }
 }
 
 TEST(Page, OneBlockTooManyIsRefused) {
     std::vector<uint4> block = smallPage().bytes();
     block.emplace_back(0u);
-    EXPECT_FALSE(parsePage(asBytes(block)).ok());
+    EXPECT_FALSE(parsePage(bytesOfBlock(block)).ok());
 }
 
 TEST(Page, NoBitFlipLeadsOutOfThePage) {
@@ -327,7 +327,7 @@ TEST(Page, LyingCountsAreRefused) {
             PageParts p = smallPage();
             p.header.*field = lie;
             const std::vector<uint4> block = p.bytes();
-            EXPECT_FALSE(parsePage(asBytes(block)).ok()) << lie;
+            EXPECT_FALSE(parsePage(bytesOfBlock(block)).ok()) << lie;
         }
     PageParts soft = smallPage();
     ++soft.header.softLeaves;
@@ -464,15 +464,15 @@ TEST(Page, ColoursMatchTheirPage) {
     const PageParts parts = smallPage();
     const std::vector<uint4> block = parts.bytes();
     std::vector<uint4> colours(colourPageBytes(parts.header) / 16, uint4(1, 2, 3, 4));
-    const auto page = parsePage(asBytes(block), asBytes(colours));
+    const auto page = parsePage(bytesOfBlock(block), bytesOfBlock(colours));
     ASSERT_TRUE(page.ok());
     EXPECT_EQ(page->faceColours.size(), 4u);
     EXPECT_EQ(page->vertexColours.size(), 4u);
     EXPECT_EQ(page->faceColours[2], uint4(1, 2, 3, 4));
     colours.emplace_back(0u);
-    EXPECT_FALSE(parsePage(asBytes(block), asBytes(colours)).ok());
+    EXPECT_FALSE(parsePage(bytesOfBlock(block), bytesOfBlock(colours)).ok());
     colours.resize(1);
-    EXPECT_FALSE(parsePage(asBytes(block), asBytes(colours)).ok());
+    EXPECT_FALSE(parsePage(bytesOfBlock(block), bytesOfBlock(colours)).ok());
 }
 
 TEST(Page, ClearanceIsRoundedDown) {

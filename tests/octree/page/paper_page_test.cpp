@@ -17,7 +17,7 @@ namespace {
 constexpr uint32_t kLog2Cells = 3;
 
 /// Two roots of 4 cells: the first has an empty child, six leaves and an inner child of leaves; the second is empty.
-PageBytes smallPage() {
+PageBytes smallPaperPage() {
     PaperPageHeader h;
     h.rootLevel = 2;
     h.roots[0] = 2;
@@ -40,7 +40,7 @@ PageBytes smallPage() {
 }
 
 TEST(PaperPage, ItsPartsAreFound) {
-    const PageBytes page = smallPage();
+    const PageBytes page = smallPaperPage();
     const auto view = parsePaperPage(page.geometryBytes(), kLog2Cells);
     ASSERT_TRUE(view) << view.error().line();
     EXPECT_EQ(view->nodes.size(), 18u);
@@ -50,7 +50,7 @@ TEST(PaperPage, ItsPartsAreFound) {
 
 TEST(PaperPage, WrongPagesAreRefused) {
     const auto refuses = [](const char* what, size_t byte, auto value) {
-        PageBytes page = smallPage();
+        PageBytes page = smallPaperPage();
         std::memcpy(reinterpret_cast<std::byte*>(page.geometry.data()) + byte, &value, sizeof value);
         EXPECT_FALSE(parsePaperPage(page.geometryBytes(), kLog2Cells)) << what;
     };
@@ -75,14 +75,14 @@ TEST(PaperPage, WrongPagesAreRefused) {
     refuses("children beyond the nodes", node(0), 18);
     refuses("children of a cell", node(10), 10);
     refuses("one group twice", node(1), 2);
-    EXPECT_FALSE(parsePaperPage(smallPage().geometryBytes().first(160), kLog2Cells));
-    EXPECT_FALSE(parsePaperPage(smallPage().geometryBytes().first(16), kLog2Cells));
-    EXPECT_FALSE(parsePaperPage(smallPage().geometryBytes(), kLog2Cells - 1));
+    EXPECT_FALSE(parsePaperPage(smallPaperPage().geometryBytes().first(160), kLog2Cells));
+    EXPECT_FALSE(parsePaperPage(smallPaperPage().geometryBytes().first(16), kLog2Cells));
+    EXPECT_FALSE(parsePaperPage(smallPaperPage().geometryBytes(), kLog2Cells - 1));
 }
 
 TEST(PaperPage, EveryFlippedBitIsReadOrRefused) {
-    for (size_t bit = 0; bit < smallPage().geometryBytes().size() * 8; ++bit) {
-        PageBytes page = smallPage();
+    for (size_t bit = 0; bit < smallPaperPage().geometryBytes().size() * 8; ++bit) {
+        PageBytes page = smallPaperPage();
         reinterpret_cast<uint8_t*>(page.geometry.data())[bit / 8] ^= uint8_t(1u << bit % 8);
         const auto view = parsePaperPage(page.geometryBytes(), kLog2Cells);
         if (!view) continue;
@@ -111,7 +111,7 @@ protected:
         const std::filesystem::path file = folder_ / "small.vcp";
         auto writer = VcpWriter::create(file, 1);
         EXPECT_TRUE(writer);
-        EXPECT_TRUE((*writer)->append({.leaves = 14}, compressPage(smallPage().geometryBytes(), {})));
+        EXPECT_TRUE((*writer)->append({.leaves = 14}, compressPage(smallPaperPage().geometryBytes(), {})));
         EXPECT_TRUE((*writer)->commit(header));
         return file;
     }
@@ -157,7 +157,7 @@ TEST_F(PaperFileTest, ComesBackAndIsNoCertifiedDataset) {
     EXPECT_EQ(dataset->header.paper.band, 3);
     const auto page = readPage(*reader, *dataset, 0, true);
     ASSERT_TRUE(page) << page.error().line();
-    EXPECT_EQ(page->geometry, smallPage().geometry);
+    EXPECT_EQ(page->geometry, smallPaperPage().geometry);
     EXPECT_TRUE(verifyFile(*reader));
     const auto cache = PageCache::open(file);
     ASSERT_FALSE(cache);

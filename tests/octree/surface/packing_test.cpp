@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kDegrees = 180 / 3.14159265358979323846;
 
-glm::dvec3 randomDirection(std::mt19937_64& random) {
+glm::dvec3 randomUnitVector(std::mt19937_64& random) {
     std::normal_distribution<double> normal;
     return glm::normalize(glm::dvec3(normal(random), normal(random), normal(random)));
 }
@@ -28,7 +28,7 @@ TEST(Packing, DefaultLosesLittle) {
     double angleSum = 0, angleMax = 0, distanceMax = 0;
     constexpr int kCount = 400000;
     for (int i = 0; i < kCount; ++i) {
-        const glm::dvec3 n = randomDirection(random);
+        const glm::dvec3 n = randomUnitVector(random);
         const double d = distance(random);
         const uint32_t code = packVector(d, n, i % 2 == 1);
         const double angle = angleDegrees(f64::decodeDirection(code >> 11), n);
@@ -55,7 +55,7 @@ TEST(Packing, PapersLosesLittle) {
     constexpr int kCount = 400000;
     for (int i = 0; i < kCount; ++i) {
         const double d = 0.01 + (range - 0.01) * unit(random);
-        const glm::dvec3 v = randomDirection(random) * d;
+        const glm::dvec3 v = randomUnitVector(random) * d;
         const glm::dvec3 back = unpackVectorSpherical(packVectorSpherical(v, range), range);
         const double angle = angleDegrees(back, v);
         angleSum += angle;
@@ -73,7 +73,7 @@ TEST(Packing, PapersLosesLittle) {
 TEST(Packing, DirectionIsKeptAtDistanceZero) {
     std::mt19937_64 random(3);
     for (int i = 0; i < 1000; ++i) {
-        const glm::dvec3 n = randomDirection(random);
+        const glm::dvec3 n = randomUnitVector(random);
         const uint32_t code = packVector(0, n, false);
         EXPECT_EQ(f64::decodeDistance(code), 0);
         EXPECT_LT(angleDegrees(f64::decodeDirection(code >> 11), n), 0.24);

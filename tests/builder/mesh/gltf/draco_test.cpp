@@ -25,7 +25,6 @@ namespace {
 using test::readAll;
 using test::ReadMesh;
 
-const std::filesystem::path kData = VCP_SHARED_DATA_DIR;
 constexpr uint64_t kMiB = 1 << 20;
 
 // A wavy grid of 2 n^2 triangles with colours, as Draco writes it.
@@ -64,13 +63,13 @@ Encoded encodedGrid(uint32_t n) {
             mesh->attribute(colours)->unique_id()};
 }
 
-ReadMesh read(const std::string& bytes, uint64_t memory = 256 * kMiB) {
+ReadMesh readDraco(const std::string& bytes, uint64_t memory = 256 * kMiB) {
     return readAll(openDraco(ByteSource::fromMemory(bytes, "mesh"), memory));
 }
 
 TEST(Draco, ReadsWhatWasEncoded) {
     const std::string bytes = encodedGrid(20).bytes;
-    const ReadMesh mesh = read(bytes);
+    const ReadMesh mesh = readDraco(bytes);
     ASSERT_FALSE(mesh.error) << mesh.line();
     EXPECT_EQ(mesh.triangles.size(), 800u);
     EXPECT_EQ(mesh.positions.size(), 441u);
@@ -88,7 +87,7 @@ TEST(Draco, ReadsWhatWasEncoded) {
 TEST(Draco, ReadsCompressedAndPipedFiles) {
     TestFolder folder("vcp_draco");
     const std::string bytes = encodedGrid(20).bytes;
-    const ReadMesh plain = read(bytes);
+    const ReadMesh plain = readDraco(bytes);
     std::ofstream(folder / "a.drc.gz", std::ios::binary) << test::gzipped(bytes);
     std::ofstream(folder / "b.dat", std::ios::binary) << bytes;
     EXPECT_TRUE(readAll(openMesh(folder / "a.drc.gz")) == plain);
@@ -110,7 +109,7 @@ TEST(Draco, ReadsCompressedPrimitives) {
     file.scene = "0,1";
     TestFolder folder("vcp_draco");
     std::ofstream(folder / "a.glb", std::ios::binary) << file.glb();
-    const ReadMesh mesh = readAll(openMesh(folder / "a.glb")), alone = read(grid.bytes);
+    const ReadMesh mesh = readAll(openMesh(folder / "a.glb")), alone = readDraco(grid.bytes);
     ASSERT_FALSE(mesh.error) << mesh.line();
     ASSERT_EQ(mesh.triangles.size(), 1600u);
     EXPECT_EQ(mesh.positions[0], alone.positions[0]);
@@ -121,7 +120,7 @@ TEST(Draco, ReadsCompressedPrimitives) {
 TEST(Draco, EveryTruncationAndFlippedBytesAreReadOrRefused) {
     const std::string bytes = encodedGrid(4).bytes;
     for (size_t kept = 0; kept < bytes.size(); kept += 3) {
-        const ReadMesh mesh = read(bytes.substr(0, kept));
+        const ReadMesh mesh = readDraco(bytes.substr(0, kept));
         EXPECT_TRUE(mesh.error) << kept;
         EXPECT_EQ(mesh.line().find('\n'), std::string::npos);
     }
@@ -129,13 +128,13 @@ TEST(Draco, EveryTruncationAndFlippedBytesAreReadOrRefused) {
     for (int i = 0; i < 60; ++i) {
         std::string broken = bytes;
         broken[random() % broken.size()] = char(random());
-        const ReadMesh mesh = read(broken, 64 * kMiB);
+        const ReadMesh mesh = readDraco(broken, 64 * kMiB);
         EXPECT_EQ(mesh.line().find('\n'), std::string::npos) << mesh.line();
     }
 }
 
 // What the decoder might do happens in the child, and so does what gives it its bytes.
-std::string lineOf(const DracoBytes& bytes) {
+std::string lineOfDraco(const DracoBytes& bytes) {
     const auto stream = decodeDraco(bytes, 0, {}, 64 * kMiB, "mesh", "");
     EXPECT_FALSE(stream.ok());
     return stream.ok() ? "" : stream.error().line();
@@ -143,18 +142,18 @@ std::string lineOf(const DracoBytes& bytes) {
 
 TEST(Draco, MemoryIsLimitedAndACrashIsOneLine) {
     // A sanitizer ends the process where there would be an exception.
-    const std::string tooMuch = lineOf([]() -> Result<std::string> { return std::string(512 * kMiB, 'x'); });
+    const std::string tooMuch = lineOfDraco([]() -> Result<std::string> { return std::string(512 * kMiB, 'x'); });
 #ifdef VCP_LIMIT_MEMORY
     EXPECT_NE(tooMuch.find("memory"), std::string::npos) << tooMuch;
 #endif
     EXPECT_NE(tooMuch, "");
-    EXPECT_NE(lineOf([]() -> Result<std::string> { std::abort(); }).find("crashed"), std::string::npos);
-    EXPECT_NE(lineOf([]() -> Result<std::string> { ::_exit(0); }).find("ended early"), std::string::npos);
-    EXPECT_NE(lineOf([]() -> Result<std::string> {
+    EXPECT_NE(lineOfDraco([]() -> Result<std::string> { std::abort(); }).find("crashed"), std::string::npos);
+    EXPECT_NE(lineOfDraco([]() -> Result<std::string> { ::_exit(0); }).find("ended early"), std::string::npos);
+    EXPECT_NE(lineOfDraco([]() -> Result<std::string> {
                   return Error{.code = ErrorCode::Io, .message = "told so"};
               }).find("told so"),
               std::string::npos);
-    EXPECT_NE(lineOf([]() -> Result<std::string> { return std::string("nothing"); }).find("not Draco"),
+    EXPECT_NE(lineOfDraco([]() -> Result<std::string> { return std::string("nothing"); }).find("not Draco"),
               std::string::npos);
 }
 
@@ -169,11 +168,11 @@ TEST(Draco, AStreamThatIsNotReadToItsEndLeavesNoProcess) {
 }
 
 TEST(Draco, KnownFiles) {
-    const auto path = kData / "draco/bunny.drc";
+    const auto path = test::kSharedData / "draco/bunny.drc";
     if (!std::filesystem::exists(path)) GTEST_SKIP() << "no " << path;
     EXPECT_EQ(readAll(openMesh(path)).triangles.size(), 69451u);
-    const ReadMesh draco = readAll(openMesh(kData / "draco/testdata/Box/glTF_Binary/Box_Draco.glb"));
-    const ReadMesh plain = readAll(openMesh(kData / "suites/draco_testdata/Box/glTF_Binary/Box.glb"));
+    const ReadMesh draco = readAll(openMesh(test::kSharedData / "draco/testdata/Box/glTF_Binary/Box_Draco.glb"));
+    const ReadMesh plain = readAll(openMesh(test::kSharedData / "suites/draco_testdata/Box/glTF_Binary/Box.glb"));
     const auto soup = [](const ReadMesh& mesh) {
         std::vector<std::array<double, 3>> centres;
         for (const auto& t : mesh.triangles) {

@@ -17,10 +17,10 @@ using test::GltfFile;
 using test::readAll;
 using test::ReadMesh;
 
-Result<std::unique_ptr<MeshStream>> open(ByteSource source) { return openGltf(std::move(source), {}, {}); }
-ReadMesh read(const std::string& bytes) { return test::readEveryWindow(open, bytes); }
-std::string lineOf(const std::string& bytes) {
-    const ReadMesh mesh = read(bytes);
+Result<std::unique_ptr<MeshStream>> openMeshopt(ByteSource source) { return openGltf(std::move(source), {}, {}); }
+ReadMesh readMeshopt(const std::string& bytes) { return test::readEveryWindow(openMeshopt, bytes); }
+std::string lineOfMeshopt(const std::string& bytes) {
+    const ReadMesh mesh = readMeshopt(bytes);
     EXPECT_TRUE(mesh.error) << bytes;
     return mesh.line();
 }
@@ -160,13 +160,13 @@ CompressedFile compressedSheet() {
 }
 
 TEST(GltfMeshopt, ReadsTheSameTrianglesAsWithoutCompression) {
-    const ReadMesh plain = read(plainSheet().embedded());
+    const ReadMesh plain = readMeshopt(plainSheet().embedded());
     ASSERT_FALSE(plain.error) << plain.line();
     ASSERT_EQ(plain.triangles.size(), 512u);
     CompressedFile file = compressedSheet();
     EXPECT_LT(file.stored.size(), plainSheet().buffer.size() / 2);
     for (const std::string& bytes : {file.embedded(), file.glb()}) {
-        const ReadMesh mesh = read(bytes);
+        const ReadMesh mesh = readMeshopt(bytes);
         ASSERT_FALSE(mesh.error) << mesh.line();
         EXPECT_EQ(mesh.positions, plain.positions);
         EXPECT_EQ(soupOf(mesh), soupOf(plain));
@@ -182,7 +182,7 @@ TEST(GltfMeshopt, ReadsTheSameTrianglesAsWithoutCompression) {
         other.meshes = same.meshes;
         for (std::string view : same.views)
             other.views.push_back(view.replace(view.find("EXT_meshopt"), 11, std::string(name).substr(0, 11)));
-        const ReadMesh mesh = read(other.embedded());
+        const ReadMesh mesh = readMeshopt(other.embedded());
         ASSERT_FALSE(mesh.error) << mesh.line();
         EXPECT_EQ(soupOf(mesh), soupOf(plain));
     }
@@ -190,7 +190,7 @@ TEST(GltfMeshopt, ReadsTheSameTrianglesAsWithoutCompression) {
 
 TEST(GltfMeshopt, IndicesOfTwoBytesAndSequences) {
     const Sheet sheet;
-    const ReadMesh plain = read(plainSheet().embedded());
+    const ReadMesh plain = readMeshopt(plainSheet().embedded());
     for (const std::string& mode : {std::string("TRIANGLES"), std::string("INDICES")})
         for (const size_t size : {size_t{2}, size_t{4}}) {
             CompressedFile file = compressedSheet();
@@ -199,7 +199,7 @@ TEST(GltfMeshopt, IndicesOfTwoBytesAndSequences) {
                                                          : ofTriangles(sheet.indices, Sheet::kVertices);
             const size_t view = file.view(stored, sheet.indices.size(), size, mode);
             file.accessor(view, size == 2 ? 5123 : 5125, "SCALAR", sheet.indices.size());
-            const ReadMesh mesh = read(file.embedded());
+            const ReadMesh mesh = readMeshopt(file.embedded());
             ASSERT_FALSE(mesh.error) << mesh.line();
             EXPECT_EQ(soupOf(mesh), soupOf(plain)) << mode << size;
             if (mode == "INDICES") {
@@ -244,7 +244,7 @@ TEST(GltfMeshopt, QuantizedAttributes) {
         const double step = isNormalized ? 2 : 2 / 65535.0;
         file.nodes = plain.nodes = fmt::format(R"({{"mesh":0,"translation":[-1,-1,-1],"scale":[{0},{0},{0}]}})", step);
         file.required = R"("KHR_mesh_quantization","EXT_meshopt_compression","KHR_texture_transform")";
-        const ReadMesh expected = read(plain.embedded()), mesh = read(file.embedded());
+        const ReadMesh expected = readMeshopt(plain.embedded()), mesh = readMeshopt(file.embedded());
         ASSERT_FALSE(mesh.error) << mesh.line();
         EXPECT_EQ(mesh.positions, expected.positions);
         EXPECT_EQ(mesh.colours, expected.colours);
@@ -291,7 +291,7 @@ TEST(GltfMeshopt, EveryFilter) {
             file.view(ofVertices(values, filter.stride), kCount, filter.stride, "ATTRIBUTES", filter.name);
         file.accessor(view, filter.component, "VEC3", kCount, filter.component == 5126 ? "" : R"(,"normalized":true)");
         file.meshes = R"({"primitives":[{"attributes":{"POSITION":0}}]})";
-        const ReadMesh mesh = read(file.embedded());
+        const ReadMesh mesh = readMeshopt(file.embedded());
         ASSERT_FALSE(mesh.error) << filter.name << mesh.line();
         ASSERT_EQ(mesh.positions.size(), kCount);
         for (size_t i = 0; i < kCount; ++i) {
@@ -323,7 +323,7 @@ TEST(GltfMeshopt, EveryTruncationIsAnError) {
             file.accessor(index, 5125, "SCALAR", count);
             file.meshes = kPrimitive;
             const std::string bytes = file.embedded();
-            const ReadMesh mesh = readAll(open(ByteSource::fromMemory(bytes, "mesh")));
+            const ReadMesh mesh = readAll(openMeshopt(ByteSource::fromMemory(bytes, "mesh")));
             ASSERT_TRUE(mesh.error) << mode << ' ' << kept << " of " << whole.size();
             EXPECT_NE(mesh.line().find("meshopt data are damaged"), std::string::npos) << mesh.line();
             EXPECT_NE(mesh.line().find(mode == "ATTRIBUTES" ? "mesh: bufferView 0" : "mesh: bufferView 1"),
@@ -340,7 +340,7 @@ TEST(GltfMeshopt, FlippedBitsAreReadOrRefusedInOneLine) {
         CompressedFile file = whole;
         file.stored[bit / 8] = char(file.stored[bit / 8] ^ 1 << bit % 8);
         const std::string bytes = file.embedded();
-        const ReadMesh mesh = readAll(open(ByteSource::fromMemory(bytes, "mesh")));
+        const ReadMesh mesh = readAll(openMeshopt(ByteSource::fromMemory(bytes, "mesh")));
         EXPECT_EQ(mesh.line().find('\n'), std::string::npos) << bit;
         mesh.error ? ++refused : ++readWrong;
     }
@@ -356,7 +356,7 @@ TEST(GltfMeshopt, WhatIsWrongIsNamed) {
         const size_t at = text.rfind(from);
         EXPECT_NE(at, std::string::npos) << from;
         text.replace(at, from.size(), to);
-        return lineOf(file.embedded());
+        return lineOfMeshopt(file.embedded());
     };
     const auto has = [](const std::string& line, const char* part) {
         return line.find(part) != std::string::npos ? "" : line;
@@ -389,10 +389,10 @@ TEST(GltfMeshopt, WhatIsWrongIsNamed) {
 
     CompressedFile later = compressedSheet();
     later.stored[0] = '\xAF';
-    EXPECT_EQ(has(lineOf(later.embedded()), "version 15 of its meshopt data is not read"), "");
+    EXPECT_EQ(has(lineOfMeshopt(later.embedded()), "version 15 of its meshopt data is not read"), "");
     CompressedFile empty = compressedSheet();
     empty.views[0] = R"({"buffer":1,"byteLength":3468,"byteStride":12})";
-    EXPECT_EQ(has(lineOf(empty.embedded()), "buffer 1: has neither"), "");
+    EXPECT_EQ(has(lineOfMeshopt(empty.embedded()), "buffer 1: has neither"), "");
 }
 
 TEST(GltfMeshopt, CountsAreCheckedAgainstTheBytesBeforeAnythingIsAllocated) {
@@ -404,18 +404,19 @@ TEST(GltfMeshopt, CountsAreCheckedAgainstTheBytesBeforeAnythingIsAllocated) {
         return file;
     };
     // 256 times its bytes, together and each.
-    const auto line = lineOf(claim(size_t{1} << 36, 16, "ATTRIBUTES", std::string(99, '\xA0'), 0).embedded());
+    const auto line = lineOfMeshopt(claim(size_t{1} << 36, 16, "ATTRIBUTES", std::string(99, '\xA0'), 0).embedded());
     EXPECT_NE(line.find("more than 64 times their buffers"), std::string::npos) << line;
     const std::string each = claim(65536, 16, "ATTRIBUTES", std::string(4096, '\xA0'), 65536).embedded();
-    EXPECT_NE(lineOf(each).find("4096 bytes cannot hold 65536 values"), std::string::npos) << lineOf(each);
+    EXPECT_NE(lineOfMeshopt(each).find("4096 bytes cannot hold 65536 values"), std::string::npos)
+        << lineOfMeshopt(each);
     const std::string triangles = claim(3 * 65536, 4, "TRIANGLES", std::string(65536, '\xE0'), 65536).embedded();
-    EXPECT_NE(lineOf(triangles).find("cannot hold"), std::string::npos) << lineOf(triangles);
+    EXPECT_NE(lineOfMeshopt(triangles).find("cannot hold"), std::string::npos) << lineOfMeshopt(triangles);
     const std::string indices = claim(65536, 4, "INDICES", std::string(65536, '\xD0'), 65536).embedded();
-    EXPECT_NE(lineOf(indices).find("cannot hold"), std::string::npos) << lineOf(indices);
+    EXPECT_NE(lineOfMeshopt(indices).find("cannot hold"), std::string::npos) << lineOfMeshopt(indices);
 
     // One byte may stand for many equal values: these are read, but not with less memory than they need.
     const std::string flat = claim(65536, 16, "ATTRIBUTES", ofVertices(std::string(1 << 20, '\1'), 16), 0).embedded();
-    EXPECT_FALSE(read(flat).error) << read(flat).line();
+    EXPECT_FALSE(readMeshopt(flat).error) << readMeshopt(flat).line();
     MeshOpenOptions options;
     options.decoderBytes = 1 << 20;
     const ReadMesh small = readAll(openGltf(ByteSource::fromMemory(flat, "mesh"), {}, options));

@@ -19,21 +19,19 @@ using test::readAll;
 using test::ReadMesh;
 using test::Triangle;
 
-const std::filesystem::path kData = VCP_SHARED_DATA_DIR;
+Result<std::unique_ptr<MeshStream>> openGltfBytes(ByteSource source) { return openGltf(std::move(source), {}, {}); }
 
-Result<std::unique_ptr<MeshStream>> open(ByteSource source) { return openGltf(std::move(source), {}, {}); }
+ReadMesh readGltf(const std::string& bytes) { return test::readEveryWindow(openGltfBytes, bytes); }
 
-ReadMesh read(const std::string& bytes) { return test::readEveryWindow(open, bytes); }
-
-std::string lineOf(const std::string& bytes) {
-    const ReadMesh mesh = read(bytes);
+std::string lineOfGltf(const std::string& bytes) {
+    const ReadMesh mesh = readGltf(bytes);
     EXPECT_TRUE(mesh.error) << bytes;
     return mesh.line();
 }
 
 TEST(Gltf, EmbeddedAndBinaryFilesReadTheSame) {
     const GltfFile file = oneTriangle();
-    const ReadMesh text = read(file.embedded()), binary = read(file.glb());
+    const ReadMesh text = readGltf(file.embedded()), binary = readGltf(file.glb());
     ASSERT_FALSE(text.error) << text.line();
     ASSERT_FALSE(binary.error) << binary.line();
     EXPECT_TRUE(text == binary);
@@ -49,7 +47,7 @@ TEST(Gltf, NodesMoveInDoubles) {
     file.nodes = R"({"translation":[376000.25,3790000.5,0],"children":[1,2]},)"
                  R"({"rotation":[0,0,0.70710678118654752,0.70710678118654752],"scale":[2,3,4],"mesh":0},)"
                  R"({"matrix":[-1,0,0,0, 0,1,0,0, 0,0,1,0, 0,0,0.125,1],"mesh":0})";
-    const ReadMesh mesh = read(file.embedded());
+    const ReadMesh mesh = readGltf(file.embedded());
     ASSERT_FALSE(mesh.error) << mesh.line();
     ASSERT_EQ(mesh.positions.size(), 6u);
     const glm::dvec3 expected[] = {{376000.25, 3790000.5, 0},     {376000.25, 3790002.5, 0},
@@ -69,7 +67,7 @@ TEST(Gltf, NormalsTurnWithTheirNodes) {
     file.nodes = R"({"mesh":0},{"mesh":0,"scale":[4,1,2]},)"
                  R"({"matrix":[-1,0,0,0, 0,0,1,0, 0,-1,0,0, 0,0,0,1],"mesh":0})";
     file.scene = "0,1,2";
-    const ReadMesh mesh = read(file.embedded());
+    const ReadMesh mesh = readGltf(file.embedded());
     ASSERT_FALSE(mesh.error) << mesh.line();
     ASSERT_EQ(mesh.normals.size(), 9u);
     const glm::dvec3 wanted[] = {own[0],    own[1],     {0, 0, 1},  {0, 0, 1}, {0.25, 1, 0},
@@ -89,10 +87,10 @@ TEST(Gltf, NormalsThatDoNotFitAreLeftOut) {
     file.floats({0, 0, 1, 0, 0, 1}, "VEC3", 2);
     file.meshes =
         fmt::format(R"({{"primitives":[{{"attributes":{{"POSITION":0,"NORMAL":{}}}}}]}})", file.accessors.size() - 1);
-    const ReadMesh mesh = read(file.embedded());
+    const ReadMesh mesh = readGltf(file.embedded());
     ASSERT_FALSE(mesh.error) << mesh.line();
     EXPECT_TRUE(mesh.normals.empty());
-    const auto stream = open(ByteSource::fromMemory(file.embedded(), "mesh"));
+    const auto stream = openGltfBytes(ByteSource::fromMemory(file.embedded(), "mesh"));
     ASSERT_EQ((*stream)->warnings().size(), 1u);
     EXPECT_NE((*stream)->warnings()[0].find("NORMAL does not fit"), std::string::npos);
 }
@@ -110,7 +108,7 @@ TEST(Gltf, StripsFansAndSequencesWithAnyIndexType) {
             if (kind < 3) file.accessor(bytes[kind], types[kind], "SCALAR", 5);
             file.meshes = fmt::format(R"({{"primitives":[{{"attributes":{{"POSITION":0}},"mode":{}{}}}]}})", mode,
                                       kind < 3 ? R"(,"indices":1)" : "");
-            const ReadMesh mesh = read(file.embedded());
+            const ReadMesh mesh = readGltf(file.embedded());
             ASSERT_FALSE(mesh.error) << mesh.line();
             EXPECT_EQ(mesh.triangles, mode == 4 ? list : mode == 5 ? strip : fan) << kind << ' ' << mode;
         }
@@ -119,7 +117,7 @@ TEST(Gltf, StripsFansAndSequencesWithAnyIndexType) {
 TEST(Gltf, PointsAndLinesAloneAreRefused) {
     GltfFile file = oneTriangle();
     file.meshes = R"({"primitives":[{"attributes":{"POSITION":0},"mode":0},{"attributes":{"POSITION":0},"mode":3}]})";
-    EXPECT_NE(lineOf(file.embedded()).find("no triangles"), std::string::npos);
+    EXPECT_NE(lineOfGltf(file.embedded()).find("no triangles"), std::string::npos);
 }
 
 TEST(Gltf, SparseValuesReplaceOthersOrZeros) {
@@ -130,7 +128,7 @@ TEST(Gltf, SparseValuesReplaceOthersOrZeros) {
         file.accessors[0] = fmt::format(
             R"({{{}"componentType":5126,"type":"VEC3","count":3,"sparse":{{"count":2,"indices":{{"bufferView":{},"componentType":5121}},"values":{{"bufferView":{}}}}}}})",
             dense ? R"("bufferView":0,)" : "", indices, values);
-        const ReadMesh mesh = read(file.embedded());
+        const ReadMesh mesh = readGltf(file.embedded());
         ASSERT_FALSE(mesh.error) << mesh.line();
         EXPECT_EQ(mesh.positions, (std::vector<glm::dvec3>{{0, 0, 0}, {5, 6, 7}, {8, 9, 10}}));
     }
@@ -143,7 +141,7 @@ TEST(Gltf, QuantizedInterleavedPositions) {
     file.accessors.push_back(R"({"bufferView":0,"componentType":5122,"type":"VEC3","count":3,"normalized":true})");
     file.meshes = R"({"primitives":[{"attributes":{"POSITION":0}}]})";
     file.more = R"(,"extensionsRequired":["KHR_mesh_quantization"])";
-    const ReadMesh mesh = read(file.embedded());
+    const ReadMesh mesh = readGltf(file.embedded());
     ASSERT_FALSE(mesh.error) << mesh.line();
     EXPECT_EQ(mesh.positions, (std::vector<glm::dvec3>{{0, 0, 0}, {1, 0, 0}, {0, -1, 0}}));
 }
@@ -153,7 +151,7 @@ TEST(Gltf, AnAccessorSharedByManyPrimitivesIsReadByRange) {
     file.floats({9, 9, 9, 9, 9, 9, 0, 0, 0, 1, 0, 0, 0, 1, 0, 9, 9, 9}, "VEC3", 6);
     file.accessor(bytesOf<uint16_t>({4, 3, 2}), 5123, "SCALAR", 3);
     file.meshes = R"({"primitives":[{"attributes":{"POSITION":0},"indices":1}]})";
-    const ReadMesh mesh = read(file.embedded());
+    const ReadMesh mesh = readGltf(file.embedded());
     ASSERT_FALSE(mesh.error) << mesh.line();
     EXPECT_EQ(mesh.positions, (std::vector<glm::dvec3>{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}));
     EXPECT_EQ(mesh.triangles, (std::vector<Triangle>{{2, 1, 0}}));
@@ -170,7 +168,7 @@ TEST(Gltf, ColoursOfAnyTypeAreEncodedAsSrgb) {
         const bool four = kind == 1;
         file.accessor(bytes[kind], types[kind], four ? "VEC4" : "VEC3", 3, kind < 2 ? R"(,"normalized":true)" : "");
         file.meshes = R"({"primitives":[{"attributes":{"POSITION":0,"COLOR_0":2},"indices":1}]})";
-        const ReadMesh mesh = read(file.embedded());
+        const ReadMesh mesh = readGltf(file.embedded());
         ASSERT_FALSE(mesh.error) << mesh.line();
         ASSERT_EQ(mesh.colours.size(), 3u);
         EXPECT_EQ(mesh.colours[0], four ? 0x00BC00FFu : 0xFFBC00FFu) << kind;
@@ -182,10 +180,10 @@ TEST(Gltf, BaseColoursCountWhereTheyDiffer) {
     const std::string red = R"({"pbrMetallicRoughness":{"baseColorFactor":[1,0,0,1]}})";
     file.more = R"(,"materials":[)" + red + "]";
     file.meshes = R"({"primitives":[{"attributes":{"POSITION":0},"indices":1,"material":0}]})";
-    EXPECT_TRUE(read(file.embedded()).colours.empty());
+    EXPECT_TRUE(readGltf(file.embedded()).colours.empty());
     file.meshes =
         R"({"primitives":[{"attributes":{"POSITION":0},"indices":1,"material":0},{"attributes":{"POSITION":0},"indices":1}]})";
-    EXPECT_EQ(read(file.embedded()).colours,
+    EXPECT_EQ(readGltf(file.embedded()).colours,
               (std::vector<Rgba8>{0xFF0000FF, 0xFF0000FF, 0xFF0000FF, 0xFFFFFFFF, 0xFFFFFFFF, 0xFFFFFFFF}));
 }
 
@@ -194,7 +192,7 @@ TEST(Gltf, InstancesAreShownOneByOne) {
     file.floats({10, 0, 0, 20, 0, 0}, "VEC3", 2);
     file.floats({1, 1, 1, 2, 2, 2}, "VEC3", 2);
     file.nodes = R"({"mesh":0,"extensions":{"EXT_mesh_gpu_instancing":{"attributes":{"TRANSLATION":2,"SCALE":3}}}})";
-    const ReadMesh mesh = read(file.embedded());
+    const ReadMesh mesh = readGltf(file.embedded());
     ASSERT_FALSE(mesh.error) << mesh.line();
     EXPECT_EQ(mesh.positions,
               (std::vector<glm::dvec3>{{10, 0, 0}, {11, 0, 0}, {10, 1, 0}, {20, 0, 0}, {22, 0, 0}, {20, 2, 0}}));
@@ -218,9 +216,9 @@ TEST(Gltf, TexturesComeWithCoordinatesMaterialsAndWarnings) {
         R"({"name":"red","pbrMetallicRoughness":{"baseColorTexture":{"index":0,"texCoord":0,"extensions":{"KHR_texture_transform":)"
         R"({"offset":[0.5,0.25],"scale":[2,4],"rotation":1.5707963267948966,"texCoord":1}}}}},)"
         R"({"pbrMetallicRoughness":{"baseColorTexture":{"index":1}}}])";
-    auto stream = open(ByteSource::fromMemory(file.embedded(), "mesh"));
+    auto stream = openGltfBytes(ByteSource::fromMemory(file.embedded(), "mesh"));
     const std::string bytes = file.embedded();
-    stream = open(ByteSource::fromMemory(bytes, "mesh"));
+    stream = openGltfBytes(ByteSource::fromMemory(bytes, "mesh"));
     ASSERT_TRUE(stream.ok()) << stream.error().line();
     ASSERT_EQ((*stream)->materials().size(), 2u);
     const Material& material = (*stream)->materials()[0];
@@ -264,14 +262,14 @@ TEST(Gltf, NothingOutsideTheFolderIsOpened) {
     EXPECT_NE(readUri("data").line().find("not a regular file"), std::string::npos);
     std::ofstream(folder / "inner/short.bin", std::ios::binary) << file.buffer.substr(0, 20);
     EXPECT_NE(readUri("short.bin").line().find("truncated"), std::string::npos);
-    EXPECT_NE(lineOf(file.json("outside.bin")).find("has no folder"), std::string::npos);
+    EXPECT_NE(lineOfGltf(file.json("outside.bin")).find("has no folder"), std::string::npos);
 }
 
 TEST(Gltf, WhatIsWrongIsNamed) {
     const auto with = [](auto change) {
         GltfFile file = oneTriangle();
         change(file);
-        return lineOf(file.embedded());
+        return lineOfGltf(file.embedded());
     };
     const auto has = [](const std::string& line, const char* part) {
         return line.find(part) != std::string::npos ? "" : line;
@@ -324,10 +322,10 @@ TEST(Gltf, WhatIsWrongIsNamed) {
                   }),
                   "vertex 1 is not finite"),
               "");
-    EXPECT_EQ(has(lineOf(R"({"asset":{"version":"1.0"}})"), "not glTF 2.0"), "");
-    EXPECT_EQ(has(lineOf(R"({"name":"no asset"})"), "not glTF 2.0"), "");
-    EXPECT_EQ(has(lineOf(R"({"asset":{"version":"2.0"},)"), "JSON: byte 27: ends too early"), "");
-    EXPECT_EQ(has(lineOf(R"({"a":)" + std::string(100'000, '[')), "256 levels"), "");
+    EXPECT_EQ(has(lineOfGltf(R"({"asset":{"version":"1.0"}})"), "not glTF 2.0"), "");
+    EXPECT_EQ(has(lineOfGltf(R"({"name":"no asset"})"), "not glTF 2.0"), "");
+    EXPECT_EQ(has(lineOfGltf(R"({"asset":{"version":"2.0"},)"), "JSON: byte 27: ends too early"), "");
+    EXPECT_EQ(has(lineOfGltf(R"({"a":)" + std::string(100'000, '[')), "256 levels"), "");
 }
 
 TEST(Gltf, NodesThatMultiplyWithoutEndAreRefused) {
@@ -336,7 +334,7 @@ TEST(Gltf, NodesThatMultiplyWithoutEndAreRefused) {
     for (int i = 1; i < 64; ++i) file.nodes += fmt::format(R"(,{{"children":[{},{}]}})", i - 1, i - 1);
     file.scene = "63";
     const std::string bytes = file.embedded();
-    const auto stream = open(ByteSource::fromMemory(bytes, "mesh"));
+    const auto stream = openGltfBytes(ByteSource::fromMemory(bytes, "mesh"));
     ASSERT_FALSE(stream.ok());
     EXPECT_EQ(stream.error().code, ErrorCode::Limit);
 }
@@ -346,15 +344,15 @@ TEST(Gltf, EveryTruncationOfAGlbIsAnError) {
     // The last two bytes pad the buffer.
     for (size_t kept = 4; kept + 2 < glb.size(); ++kept) {
         const std::string cut = glb.substr(0, kept);
-        EXPECT_TRUE(readAll(open(ByteSource::fromMemory(cut, "mesh"))).error) << kept;
+        EXPECT_TRUE(readAll(openGltfBytes(ByteSource::fromMemory(cut, "mesh"))).error) << kept;
     }
 }
 
 TEST(Gltf, TheSameSceneAsPly) {
-    const auto gltf = kData / "scenes/sanmiguel_arch/sanmiguel_arch.gltf";
+    const auto gltf = test::kSharedData / "scenes/sanmiguel_arch/sanmiguel_arch.gltf";
     if (!std::filesystem::exists(gltf)) GTEST_SKIP() << "no " << gltf;
     const ReadMesh scene = readAll(openMesh(gltf)),
-                   flat = readAll(openMesh(kData / "scenes/sanmiguel_arch/sanmiguel_arch_rgb.ply"));
+                   flat = readAll(openMesh(test::kSharedData / "scenes/sanmiguel_arch/sanmiguel_arch_rgb.ply"));
     ASSERT_FALSE(scene.error) << scene.line();
     ASSERT_EQ(scene.triangles.size(), flat.triangles.size());
     const auto bounds = [](const ReadMesh& mesh) {
