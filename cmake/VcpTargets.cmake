@@ -18,6 +18,11 @@ function(vcp_options target)
         target_compile_options(${target} PRIVATE $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>)
         target_link_options(${target} PUBLIC -fsanitize=${VCP_SANITIZE})
     endif()
+    if(VCP_FUZZ)
+        # What libFuzzer learns from as it runs.
+        target_compile_options(${target} PRIVATE -fsanitize=fuzzer-no-link)
+        target_link_options(${target} PUBLIC -fsanitize=fuzzer-no-link)
+    endif()
 endfunction()
 
 function(vcp_library name)
