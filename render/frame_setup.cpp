@@ -20,8 +20,6 @@ static_assert(kMostSections == frame::kMaxSections && kMostLights == frame::kMax
 
 namespace {
 
-glm::vec4 toVec4(glm::dvec3 v) { return glm::vec4(glm::vec3(v), 0); }
-
 /// Encodes a colour for the screen with a plain power, as in shade.comp.
 glm::vec4 encoded(glm::vec3 linear) { return glm::vec4(glm::pow(glm::max(linear, 0.0f), glm::vec3(1 / 2.2f)), 0); }
 

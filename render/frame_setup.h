@@ -12,6 +12,9 @@
 
 namespace vcp {
 
+/// Returns a vector as shaders get it: rounded, with a fourth component of 0.
+inline glm::vec4 toVec4(glm::dvec3 v) { return {glm::vec3(v), 0}; }
+
 /// `request` is as seen from the dataset (requestIn); `placement` gives what shows the world's axes or units. `dataset`
 /// may be null: a picture of the background. `stripes`: see stripedIndex in tiles.glsl. `colour`: whether hits have
 /// colours. `errorPixels`: error of what is drawn (UpdateResult).

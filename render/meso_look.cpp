@@ -10,8 +10,6 @@ namespace vcp {
 
 namespace {
 
-glm::vec4 toVec4(glm::dvec3 v) { return {glm::vec3(v), 0}; }
-
 uint32_t shownIn(ShadingMode mode) {
     switch (mode) {
         case ShadingMode::Normals:

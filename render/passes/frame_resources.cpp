@@ -7,15 +7,12 @@
 #include <utility>
 #include <vector>
 
+#include "render/passes/descriptor_types.h"
 #include "render/vulkan/check.h"
 
 namespace vcp {
 
 namespace {
-
-constexpr VkDescriptorType kTexels = VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER;
-constexpr VkDescriptorType kStorage = VK_DESCRIPTOR_TYPE_STORAGE_BUFFER;
-constexpr VkDescriptorType kUniform = VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER;
 
 struct Binding {
     VkDescriptorType type;

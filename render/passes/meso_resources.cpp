@@ -2,17 +2,16 @@
 
 #include <fmt/format.h>
 
+#include "render/passes/descriptor_types.h"
 #include "render/vulkan/check.h"
 
 namespace vcp {
 
 namespace {
 
-constexpr VkDescriptorType kTexels = VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER;
-constexpr VkDescriptorType kStorage = VK_DESCRIPTOR_TYPE_STORAGE_BUFFER;
-constexpr VkDescriptorType kBindings[] = {
-    VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, kTexels, kTexels, kTexels, kStorage, kStorage, kStorage, kTexels};
-constexpr uint32_t kBindingCount = std::size(kBindings);
+constexpr VkDescriptorType kMesoBindings[] = {kUniform, kTexels,  kTexels,  kTexels,
+                                              kStorage, kStorage, kStorage, kTexels};
+constexpr uint32_t kMesoBindingCount = std::size(kMesoBindings);
 
 }  // namespace
 
@@ -24,10 +23,10 @@ Result<std::unique_ptr<MesoResources>> MesoResources::create(Device& device) {
 
 Result<void> MesoResources::createLayout() {
     std::vector<VkDescriptorSetLayoutBinding> bindings;
-    for (uint32_t i = 0; i < kBindingCount; ++i)
-        bindings.push_back({i, kBindings[i], 1, VK_SHADER_STAGE_COMPUTE_BIT, nullptr});
+    for (uint32_t i = 0; i < kMesoBindingCount; ++i)
+        bindings.push_back({i, kMesoBindings[i], 1, VK_SHADER_STAGE_COMPUTE_BIT, nullptr});
     VkDescriptorSetLayoutCreateInfo set{VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO};
-    set.bindingCount = kBindingCount;
+    set.bindingCount = kMesoBindingCount;
     set.pBindings = bindings.data();
     VCP_VK(vkCreateDescriptorSetLayout, device_.handle(), &set, nullptr, &setLayout_);
     VkPipelineLayoutCreateInfo layout{VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO};
@@ -103,29 +102,29 @@ Result<MesoSet> MesoResources::makeSet(const Bound& bound) const {
     allocation.pSetLayouts = &setLayout_;
     VCP_VK(vkAllocateDescriptorSets, device_.handle(), &allocation, &owner.set);
 
-    const VkBufferView views[kBindingCount] = {VK_NULL_HANDLE,
-                                               bound.words->view.handle(),
-                                               bound.words->quads.handle(),
-                                               bound.input->view.handle(),
-                                               VK_NULL_HANDLE,
-                                               VK_NULL_HANDLE,
-                                               VK_NULL_HANDLE,
-                                               (bound.look != nullptr ? bound.look : bound.input)->view.handle()};
-    const Buffer* const buffers[kBindingCount] = {bound.constants, nullptr,       nullptr,        nullptr,
-                                                  bound.hits,      bound.picture, bound.counters, nullptr};
-    VkDescriptorBufferInfo infos[kBindingCount] = {};
-    VkWriteDescriptorSet writes[kBindingCount];
-    for (uint32_t i = 0; i < kBindingCount; ++i) {
+    const VkBufferView views[kMesoBindingCount] = {VK_NULL_HANDLE,
+                                                   bound.words->view.handle(),
+                                                   bound.words->quads.handle(),
+                                                   bound.input->view.handle(),
+                                                   VK_NULL_HANDLE,
+                                                   VK_NULL_HANDLE,
+                                                   VK_NULL_HANDLE,
+                                                   (bound.look != nullptr ? bound.look : bound.input)->view.handle()};
+    const Buffer* const buffers[kMesoBindingCount] = {bound.constants, nullptr,       nullptr,        nullptr,
+                                                      bound.hits,      bound.picture, bound.counters, nullptr};
+    VkDescriptorBufferInfo infos[kMesoBindingCount] = {};
+    VkWriteDescriptorSet writes[kMesoBindingCount];
+    for (uint32_t i = 0; i < kMesoBindingCount; ++i) {
         if (buffers[i] != nullptr) infos[i] = {buffers[i]->handle(), 0, VK_WHOLE_SIZE};
         writes[i] = {VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET};
         writes[i].dstSet = owner.set;
         writes[i].dstBinding = i;
         writes[i].descriptorCount = 1;
-        writes[i].descriptorType = kBindings[i];
+        writes[i].descriptorType = kMesoBindings[i];
         writes[i].pBufferInfo = &infos[i];
         writes[i].pTexelBufferView = &views[i];
     }
-    vkUpdateDescriptorSets(device_.handle(), kBindingCount, writes, 0, nullptr);
+    vkUpdateDescriptorSets(device_.handle(), kMesoBindingCount, writes, 0, nullptr);
     return owner;
 }
 

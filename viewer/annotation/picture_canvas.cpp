@@ -10,7 +10,7 @@ namespace vcp {
 
 namespace {
 
-constexpr double kCapitals = 9;                        // height, in units
+constexpr double kCapitalUnits = 9;                    // height, in units
 constexpr double kLineHeight = 1.5, kBaseline = 1.15;  // in heights of capitals
 constexpr float kPlateOpacity = 0.92f;
 
@@ -24,7 +24,7 @@ constexpr Inks kLight{glm::vec3(0.106f, 0.122f, 0.149f), glm::vec3(1), glm::vec3
 class PictureCanvas : public AnnotationCanvas {
 public:
     PictureCanvas(Picture& rows, uint32_t firstRow, bool isDark, double unit)
-        : rows_(rows), origin_(0, firstRow), inks_(isDark ? kDark : kLight), capitals_(kCapitals * unit) {}
+        : rows_(rows), origin_(0, firstRow), inks_(isDark ? kDark : kLight), capitals_(kCapitalUnits * unit) {}
 
     void line(glm::dvec2 from, glm::dvec2 to, double width, AnnotationInk ink) override {
         drawLine(rows_, from - origin_, to - origin_, width, colourOf(ink));

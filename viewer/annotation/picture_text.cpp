@@ -15,7 +15,7 @@ namespace vcp {
 
 namespace {
 
-constexpr double kCapitals = 0.727;  // height of Inter's, in its size
+constexpr double kCapitalPart = 0.727;  // height of Inter's, in its size
 constexpr uint32_t kNotUtf8 = 0xfffd;
 constexpr FT_Int32 kAsDesigned = FT_LOAD_NO_HINTING | FT_LOAD_NO_BITMAP;
 
@@ -98,7 +98,7 @@ double visitLetters(std::string_view text, double height, bool isDrawn, double f
     double x = from;
     while (!text.empty()) {
         const uint32_t character = takeCharacter(text);
-        const FT_GlyphSlot glyph = face().glyph(character, height / kCapitals, x - std::floor(x), isDrawn);
+        const FT_GlyphSlot glyph = face().glyph(character, height / kCapitalPart, x - std::floor(x), isDrawn);
         if (!glyph) continue;
         visit(glyph, x);
         x += double(glyph->linearHoriAdvance) / 65536;

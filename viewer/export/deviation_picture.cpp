@@ -18,7 +18,7 @@ namespace {
 
 constexpr glm::dvec3 kBackground(1, 1, 1), kInk(0.13, 0.13, 0.15), kFaint(0.72, 0.72, 0.74);
 constexpr int kSide = 2;  // rays an edge of a pixel
-constexpr size_t kBins = 120;
+constexpr size_t kPictureBins = 120;
 
 glm::dvec3 lightOf(glm::dvec3 srgb) { return {srgbToLinear(srgb.x), srgbToLinear(srgb.y), srgbToLinear(srgb.z)}; }
 
@@ -103,13 +103,13 @@ void drawScale(Picture& picture, const Deviation& deviation, const DeviationPict
     }
     if (!options.unit.empty()) drawText(picture, options.unit, {barEnd + em, top - 0.9 * em}, em, kInk);
 
-    const DeviationHistogram histogram = histogramOf(deviation, options.range, kBins);
+    const DeviationHistogram histogram = histogramOf(deviation, options.range, kPictureBins);
     const double largest = double(std::max<uint64_t>(*std::ranges::max_element(histogram.counts), 1));
     const int base = barEnd + int(widest + 2 * em), end = int(options.width) - int(1.5 * em);
     drawLine(picture, {base - 1.0, double(top)}, {base - 1.0, double(bottom)}, 1, kFaint);
     for (int y = top; y < bottom; ++y) {
         const double part = double(bottom - 1 - y) / double(bottom - top);
-        const size_t bin = std::min(size_t(part * double(kBins)), kBins - 1);
+        const size_t bin = std::min(size_t(part * double(kPictureBins)), kPictureBins - 1);
         const int reach = base + int(std::lround(double(end - base) * double(histogram.counts[bin]) / largest));
         const double middle = histogram.lowerEnd(bin) + histogram.binWidth() / 2;
         fillRectangle(picture, {base, y}, {reach, y + 1}, divergingColour(middle / options.range) * 0.88);

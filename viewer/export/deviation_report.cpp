@@ -9,7 +9,7 @@ namespace vcp {
 
 namespace {
 
-constexpr size_t kBins = 60;
+constexpr size_t kReportBins = 60;
 
 }  // namespace
 
@@ -21,7 +21,7 @@ double usualRange(const Deviation& deviation, double diagonal) {
 nlohmann::ordered_json deviationJson(const Deviation& d, const ComparedSurfaces& compared,
                                      const std::string& direction) {
     using Json = nlohmann::ordered_json;
-    const DeviationHistogram histogram = histogramOf(d, compared.range, kBins);
+    const DeviationHistogram histogram = histogramOf(d, compared.range, kReportBins);
     Json figures = {{"mean", d.mean}, {"rms", d.rms}, {"mean_absolute", d.meanAbsolute}};
     for (const auto& [word, part] : kDeviationQuantiles) figures[word] = d.quantile(part);
     figures["min"] = d.distances.front();
@@ -54,9 +54,9 @@ std::string deviationCsv(const Deviation& d, double range) {
     figure("min", d.distances.front());
     figure("max", d.distances.back());
     text += fmt::format("samples,,,{}\nwithout_counterpart,,,{}\n", d.samples, d.withoutCounterpart());
-    const DeviationHistogram h = histogramOf(d, range, kBins);
+    const DeviationHistogram h = histogramOf(d, range, kReportBins);
     text += fmt::format("count,,{},{}\n", -h.range, h.below);
-    for (size_t i = 0; i < kBins; ++i)
+    for (size_t i = 0; i < kReportBins; ++i)
         text += fmt::format("count,{},{},{}\n", h.lowerEnd(i), h.lowerEnd(i) + h.binWidth(), h.counts[i]);
     return text + fmt::format("count,{},,{}\n", h.range, h.above);
 }

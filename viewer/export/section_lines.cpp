@@ -12,25 +12,25 @@ namespace {
 
 bool isLess(glm::dvec3 a, glm::dvec3 b) { return std::tie(a.x, a.y, a.z) < std::tie(b.x, b.y, b.z); }
 
-constexpr uint32_t kNone = UINT32_MAX;
+constexpr uint32_t kNoEnd = UINT32_MAX;
 
 /// Segments as links between points, and the walk along them.
 class Chains {
 public:
-    explicit Chains(size_t segments) : ends_(segments), next_(2 * segments, kNone), isUsed_(segments, false) {}
+    explicit Chains(size_t segments) : ends_(segments), next_(2 * segments, kNoEnd), isUsed_(segments, false) {}
 
     /// Joins two ends; an end is twice a segment's number, and 1 more for its second point.
     void link(uint32_t a, uint32_t b) {
         next_[a] = b;
         next_[b] = a;
     }
-    [[nodiscard]] bool isOpen(uint32_t end) const { return next_[end] == kNone; }
+    [[nodiscard]] bool isOpen(uint32_t end) const { return next_[end] == kNoEnd; }
     [[nodiscard]] bool isUsed(uint32_t segment) const { return isUsed_[segment]; }
 
     /// Returns the ends that are passed from `end` on: each segment's near end, then its far end.
     std::vector<uint32_t> walk(uint32_t end) {
         std::vector<uint32_t> passed;
-        while (end != kNone && !isUsed_[end / 2]) {
+        while (end != kNoEnd && !isUsed_[end / 2]) {
             isUsed_[end / 2] = true;
             passed.push_back(end);
             passed.push_back(end ^ 1u);

@@ -21,7 +21,7 @@ namespace vcp {
 
 namespace {
 
-constexpr uint32_t kNone = UINT32_MAX;
+constexpr uint32_t kNoRank = UINT32_MAX;
 
 /// A vertex that pages other than its home name, too.
 struct SharedVertex {
@@ -36,19 +36,19 @@ using SharedTable = std::vector<SharedVertex>;
 
 /// How a page numbers its vertices.
 struct PageNumbers {
-    std::vector<uint32_t> rank = {};  ///< of each point; kNone where it belongs elsewhere, or no triangle has it
+    std::vector<uint32_t> rank = {};  ///< of each point; kNoRank where it belongs elsewhere, or no triangle has it
     uint32_t own = 0;                 ///< vertices that belong to the page
     SharedTable shared = {};          ///< sorted
 };
 
 PageNumbers numbersOf(const PageSurface& surface) {
-    PageNumbers numbers{.rank = std::vector<uint32_t>(surface.points.size(), kNone)};
+    PageNumbers numbers{.rank = std::vector<uint32_t>(surface.points.size(), kNoRank)};
     const auto isOwn = [&](uint32_t v) { return surface.homes[v] == surface.page; };
     for (const Index3& t : surface.whole)
         for (const uint32_t v : t)
             if (isOwn(v)) numbers.rank[v] = 0;
     for (uint32_t& rank : numbers.rank)
-        if (rank != kNone) rank = numbers.own++;
+        if (rank != kNoRank) rank = numbers.own++;
     for (const Index3& t : surface.whole) {
         if (std::ranges::all_of(t, isOwn)) continue;
         for (const uint32_t v : t)
@@ -203,7 +203,7 @@ private:
         PageNumbers numbers = numbersOf(surface);
         PageVertices piece{.error = surface.error};
         for (size_t v = 0; v < surface.points.size(); ++v)
-            if (numbers.rank[v] != kNone)
+            if (numbers.rank[v] != kNoRank)
                 piece.vertices.push_back({.at = cut_.worldOf(surface.points[v]),
                                           .colour = surface.colours.empty() ? 0xffffffff : surface.colours[v]});
         for (const ColouredPoint& p : surface.loose.points)

@@ -11,25 +11,25 @@ namespace vcp {
 
 namespace {
 
-using Json = nlohmann::ordered_json;
+using OrderedJson = nlohmann::ordered_json;
 
-Json triple(glm::dvec3 v) { return Json::array({v.x, v.y, v.z}); }
+OrderedJson triple(glm::dvec3 v) { return OrderedJson::array({v.x, v.y, v.z}); }
 
-Json datasetJson(const SceneDataset& dataset) {
+OrderedJson datasetJson(const SceneDataset& dataset) {
     const Similarity& placement = dataset.placement;
-    Json json{{"file", isHttpUrl(dataset.file) ? addressWithoutUser(dataset.file) : dataset.file}};
+    OrderedJson json{{"file", isHttpUrl(dataset.file) ? addressWithoutUser(dataset.file) : dataset.file}};
     if (placement.translation != glm::dvec3(0)) json["translate"] = triple(placement.translation);
     if (const double angle = glm::angle(placement.rotation); angle != 0)
         json["rotate"] = {{"axis", triple(glm::axis(placement.rotation))}, {"degrees", angle * 180 / std::numbers::pi}};
     if (placement.scale != 1) json["scale"] = placement.scale;
-    if (dataset.colour) json["colour"] = Json::array({dataset.colour->r, dataset.colour->g, dataset.colour->b});
+    if (dataset.colour) json["colour"] = OrderedJson::array({dataset.colour->r, dataset.colour->g, dataset.colour->b});
     if (dataset.opacity != 1) json["opacity"] = dataset.opacity;
     return json;
 }
 
-Json surfaceJson(const MesoSurfaceDescription& surface) {
+OrderedJson surfaceJson(const MesoSurfaceDescription& surface) {
     const MesoSurfaceDescription usual;
-    Json json{{"asset", surface.asset}};
+    OrderedJson json{{"asset", surface.asset}};
     const auto put = [&](const char* key, const auto& value, const auto& unwritten) {
         if (value != unwritten) json[key] = value;
     };
@@ -43,7 +43,7 @@ Json surfaceJson(const MesoSurfaceDescription& surface) {
     put("scale", surface.scale, usual.scale);
     if (surface.up != usual.up) json["up"] = "y";
     if (surface.colour != usual.colour)
-        json["colour"] = Json::array({surface.colour.r, surface.colour.g, surface.colour.b});
+        json["colour"] = OrderedJson::array({surface.colour.r, surface.colour.g, surface.colour.b});
     put("texture", surface.colourTexture, usual.colourTexture);
     put("normal_texture", surface.normalTexture, usual.normalTexture);
     json["method"] = surface.method.name;
@@ -51,30 +51,30 @@ Json surfaceJson(const MesoSurfaceDescription& surface) {
     put("grid", surface.method.cells, usual.method.cells);
     const meso::Cones cones = surface.method.cones, usualCones = usual.method.cones;
     if (cones.azimuth != usualCones.azimuth || cones.elevation != usualCones.elevation)
-        json["cones"] = Json::array({cones.azimuth, cones.elevation});
+        json["cones"] = OrderedJson::array({cones.azimuth, cones.elevation});
     put("steps", surface.method.steps, usual.method.steps);
     put("rank", surface.method.rank, usual.method.rank);
     if (surface.method.directions != usual.method.directions)
-        json["directions"] = Json::array({surface.method.directions.x, surface.method.directions.y});
+        json["directions"] = OrderedJson::array({surface.method.directions.x, surface.method.directions.y});
     put("base", surface.withBase, usual.withBase);
     put("far", surface.withFar, usual.withFar);
     return json;
 }
 
-Json annotationJson(const Annotation& annotation) {
-    Json json{{"position", triple(annotation.position)}};
+OrderedJson annotationJson(const Annotation& annotation) {
+    OrderedJson json{{"position", triple(annotation.position)}};
     if (!annotation.title.empty()) json["title"] = annotation.title;
     if (!annotation.text.empty()) json["text"] = annotation.text;
     return json;
 }
 
 /// Names of files need not be UTF-8; JSON must.
-std::string dumped(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
+std::string dumped(const OrderedJson& json) { return json.dump(-1, ' ', false, OrderedJson::error_handler_t::replace); }
 
 /// Makes a text of the keys, each with what it has in a line of its own.
 class SceneText {
 public:
-    void add(const char* key, const Json& value) {
+    void add(const char* key, const OrderedJson& value) {
         text_ += (text_.empty() ? "  \"" : ",\n  \"") + std::string(key) + "\": " + dumped(value);
     }
     template <class Items, class ToJson>
@@ -93,7 +93,7 @@ private:
 }  // namespace
 
 std::string annotationsToJson(const std::vector<Annotation>& annotations) {
-    Json list = Json::array();
+    OrderedJson list = OrderedJson::array();
     for (const Annotation& each : annotations) list.push_back(annotationJson(each));
     return dumped(list);
 }
@@ -103,19 +103,20 @@ std::string sceneToJson(const SceneFile& scene) {
     text.addList("datasets", scene.datasets, datasetJson);
     text.addList("mesostructure", scene.surfaces, surfaceJson);
     if (!scene.lights.empty()) {
-        Json lights = Json::array();
+        OrderedJson lights = OrderedJson::array();
         for (const DirectedLight& light : scene.lights) {
-            Json json{{"direction", triple(light.direction)}, {"follows_camera", light.followsCamera}};
+            OrderedJson json{{"direction", triple(light.direction)}, {"follows_camera", light.followsCamera}};
             if (light.strength != 1) json["strength"] = light.strength;
             lights.push_back(std::move(json));
         }
         text.add("lights", lights);
     }
-    if (scene.camera) text.add("camera", Json::parse(cameraToJson(*scene.camera)));
+    if (scene.camera) text.add("camera", OrderedJson::parse(cameraToJson(*scene.camera)));
     text.addList("sections", scene.sections, [](const SectionPlane& plane) {
-        return Json{{"normal", triple(plane.normal)}, {"offset", plane.offset}};
+        return OrderedJson{{"normal", triple(plane.normal)}, {"offset", plane.offset}};
     });
-    if (scene.sectionCaps != Caps::None) text.add("caps", scene.sectionCaps == Caps::All ? Json("all") : Json(true));
+    if (scene.sectionCaps != Caps::None)
+        text.add("caps", scene.sectionCaps == Caps::All ? OrderedJson("all") : OrderedJson(true));
     text.addList("annotations", scene.annotations, annotationJson);
     return text.take();
 }
