@@ -36,7 +36,7 @@ Result<void> place(PlacedLayer& layer, const FrameRequest& request) {
     layer.seen = requestIn(layer.drawn.placement, requestOfLook(request, layer.drawn.number));
     VCP_TRY_ASSIGN(layer.cut, CutScene::create(residency.dataset().header, residency.hasColour(),
                                                cutPages(residency, layer.drawn.view)));
-    layer.cut->showImages(layer.drawn.images);
+    layer.cut->showImages(residency.images());
     if (request.sample == 0 && residency.asksRays(layer.drawn.view)) layer.marks.emplace(layer.cut->scene().pages());
     return {};
 }

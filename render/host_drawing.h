@@ -22,7 +22,6 @@ struct HostDataset {
     uint32_t number = 0;     ///< among those that are open
     double errorPixels = 0;  ///< of the view's last update
     ViewNumber view = 0;
-    const ImageSet* images = nullptr;  ///< of the dataset's file; null: the colours of vertices are shown
 };
 
 /// Refuses what the host does not draw of a dataset. `name`: its file's. Errors: Unsupported.

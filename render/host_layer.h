@@ -32,7 +32,7 @@ public:
     static Result<CutScene> create(const FileHeader& header, bool withColour, std::vector<CutPage> cut);
 
     /// As HostScene's.
-    void showImages(const ImageSet* images) { scene_.showImages(images); }
+    void showImages(std::shared_ptr<const ImageSet> images) { scene_.showImages(std::move(images)); }
     [[nodiscard]] const HostScene& scene() const { return scene_; }
     /// Returns the numbers of the pages that rays marked, and of those in whose place these are drawn.
     [[nodiscard]] std::vector<uint64_t> marked(const PageMarks& marks) const;

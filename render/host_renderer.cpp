@@ -38,7 +38,7 @@ Result<void> HostRenderer::open(std::vector<PlacedDataset> datasets, std::span<c
     const auto openAll = [&]() -> Result<void> {
         for (const PlacedDataset& placed : datasets) VCP_TRY(checkHostDraws(*placed.dataset, placed.source->name()));
         RendererOptions left = options_;
-        VCP_TRY_ASSIGN(auto images, readImages(datasets, options_.colour, options_.ramBytes / 2));
+        VCP_TRY_ASSIGN(auto images, findImages(datasets, options_.colour, options_.ramBytes / 2));
         VCP_TRY_ASSIGN(left.budgetBytes, budgetOfPages(options_.budgetBytes, bytesOf(prepared_)));
         VCP_TRY_ASSIGN(datasets_, openResidencies(hostPageMemory(), left, std::move(datasets), std::move(images)));
         return {};
@@ -118,8 +118,7 @@ std::vector<HostDataset> HostRenderer::drawn(const FrameRequest& request) const 
             drawn.push_back({.residency = *datasets_[i].residency,
                              .placement = datasets_[i].placement,
                              .number = uint32_t(i),
-                             .errorPixels = errorPixels_[i],
-                             .images = datasets_[i].images.get()});
+                             .errorPixels = errorPixels_[i]});
     return drawn;
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <numeric>
 
 #include <fmt/format.h>
 #include <glm/common.hpp>
@@ -68,33 +69,33 @@ uint64_t budgetOfImages(uint64_t budgetBytes) {
 
 uint64_t ramOfPages(uint64_t ramBytes, uint64_t imageBytes) { return ramBytes - std::min(imageBytes, ramBytes / 2); }
 
-Result<DatasetImages> readImages(std::span<const PlacedDataset> datasets, bool withColour, uint64_t mostBytes) {
-    DatasetImages images(datasets.size());
-    uint64_t left = mostBytes;
+uint64_t DatasetImages::bytes() const { return std::accumulate(mostBytes.begin(), mostBytes.end(), uint64_t{0}); }
+
+Result<DatasetImages> findImages(std::span<const PlacedDataset> datasets, bool withColour, uint64_t mostBytes) {
+    DatasetImages found{.pieces = {datasets.size(), nullptr}, .mostBytes = std::vector<uint64_t>(datasets.size())};
     for (size_t i = 0; i < datasets.size(); ++i) {
         if (!withColour || !datasets[i].dataset->hasImages()) continue;
-        VCP_TRY_ASSIGN(images[i], datasets[i].source->readImages(left));
-        left -= images[i] ? std::min(images[i]->bytes(), left) : 0;
+        VCP_TRY_ASSIGN(found.pieces[i], datasets[i].source->images());
+        if (!found.pieces[i]) continue;
+        for (uint32_t image = 0; image < found.pieces[i]->tables().images.size(); ++image)
+            for (const ImageLevel& level : found.pieces[i]->levelsOf(image))
+                found.mostBytes[i] += level.texels() * sizeof(uint32_t);
     }
-    return images;
-}
-
-uint64_t bytesOf(const DatasetImages& images) {
-    uint64_t bytes = 0;
-    for (const auto& each : images) bytes += each ? each->bytes() : 0;
-    return bytes;
+    const double share = double(mostBytes) / double(std::max<uint64_t>(found.bytes(), 1));
+    if (share < 1)
+        for (uint64_t& bytes : found.mostBytes) bytes = uint64_t(share * double(bytes));
+    return found;
 }
 
 uint64_t imageBytes(std::span<const PlacedResidency> datasets) {
     uint64_t bytes = 0;
-    for (const PlacedResidency& placed : datasets) bytes += placed.images ? placed.images->bytes() : 0;
+    for (const PlacedResidency& placed : datasets) bytes += placed.residency->mostImageBytes();
     return bytes;
 }
 
 Result<std::vector<PlacedResidency>> openResidencies(const PageMemorySource& memory, const RendererOptions& options,
                                                      std::vector<PlacedDataset> placed, DatasetImages images) {
     std::vector<PlacedResidency> opened;
-    images.resize(placed.size());
     if (placed.empty()) return opened;
     ResidencyOptions all;
     all.budgetBytes = options.budgetBytes;
@@ -102,10 +103,12 @@ Result<std::vector<PlacedResidency>> openResidencies(const PageMemorySource& mem
     all.order = options.order;
     all.hiddenToo = options.hiddenToo;
     all.loader.withColour = options.colour;
-    all.loader.heldBytes = ramOfPages(options.ramBytes, bytesOf(images));
+    all.loader.heldBytes = ramOfPages(options.ramBytes, images.bytes());
+    all.imageBytes = images.mostBytes;
     all.loader.threads = loaderThreads(placed, options.loaderThreads);
     std::vector<SceneSource::Part> parts;
-    for (PlacedDataset& one : placed) {
+    for (size_t i = 0; i < placed.size(); ++i) {
+        PlacedDataset& one = placed[i];
         const uint64_t needed = placed.size() > 1 && !one.dataset->pages.empty()
                                     ? one.source->bytesToRead(0, options.colour && one.dataset->hasColour())
                                     : 0;
@@ -115,11 +118,12 @@ Result<std::vector<PlacedResidency>> openResidencies(const PageMemorySource& mem
                                                 "memory for pages on their way: allow more",
                                                 needed, all.loader.heldBytes),
                          .file = one.source->name()};
-        parts.push_back({std::move(one.dataset), std::move(one.source)});
+        parts.push_back({std::move(one.dataset), std::move(one.source),
+                         images.pieces.empty() ? nullptr : std::move(images.pieces[i])});
     }
     VCP_TRY_ASSIGN(auto scene, SceneResidency::create(memory, all, std::move(parts)));
     for (size_t i = 0; i < placed.size(); ++i)
-        opened.push_back({std::shared_ptr<Residency>(scene, &scene->dataset(i)), placed[i].placement, images[i]});
+        opened.push_back({std::shared_ptr<Residency>(scene, &scene->dataset(i)), placed[i].placement});
     return opened;
 }
 
@@ -162,7 +166,7 @@ Result<std::optional<UpdateResult>> updateShown(std::span<const ShownResidency> 
         const size_t dataset = each.residency->number();
         results.push_back(each.residency->cutOf(*views[dataset], update.cuts[dataset], number));
         *each.errorPixels = results.back().errorPixels;
-        cuts = (cuts + each.residency->cutNumber(number)) * 0x9e3779b97f4a7c15;
+        cuts = (cuts + each.residency->pagesNumber(number)) * 0x9e3779b97f4a7c15;
     }
     for (size_t i = 0; i < shown.size(); ++i) {
         UpdateResult& one = results[i];

@@ -16,17 +16,20 @@ namespace vcp {
 struct PlacedResidency {
     std::shared_ptr<Residency> residency;  ///< with the scene's, as long as one of its datasets is kept
     Similarity placement;
-    std::shared_ptr<const ImageSet> images;  ///< of its file; null: the colours of vertices are shown
 };
 
-/// Images of datasets, one for each, null where it has none.
-using DatasetImages = std::vector<std::shared_ptr<const ImageSet>>;
+/// The images of datasets, one for each, null where it has none, and the most bytes that they may take.
+struct DatasetImages {
+    std::vector<std::shared_ptr<const ImagePieces>> pieces;
+    std::vector<uint64_t> mostBytes;
 
-/// Reads the images of datasets; without colour, none. Where all together take more than `mostBytes`, the finest levels
-/// are left out; the coarsest level of each is always there. Errors: as of PageSource::readImages.
-Result<DatasetImages> readImages(std::span<const PlacedDataset> datasets, bool withColour, uint64_t mostBytes);
-/// Bytes of all images.
-uint64_t bytesOf(const DatasetImages& images);
+    [[nodiscard]] uint64_t bytes() const;
+};
+
+/// Reads the tables of the images of datasets; without colour, of none. Together the images may take `mostBytes`, each
+/// dataset's its share by what there is of them, and no more than that. Errors: as of PageSource::images.
+Result<DatasetImages> findImages(std::span<const PlacedDataset> datasets, bool withColour, uint64_t mostBytes);
+/// Bytes that the images of datasets may take.
 uint64_t imageBytes(std::span<const PlacedResidency> datasets);
 
 /// Refuses budgets that are too small for any page. Errors: Usage.
@@ -40,7 +43,7 @@ uint64_t budgetOfImages(uint64_t budgetBytes);
 uint64_t ramOfPages(uint64_t ramBytes, uint64_t imageBytes);
 
 /// Makes the datasets' residencies, whose one pool comes from `memory`, within options.budgetBytes and ramBytes.
-/// `images`: none, or of each dataset; they count as RAM. Errors: as of SceneResidency::create.
+/// `images`: none, or of each dataset; what they may take counts as RAM. Errors: as of SceneResidency::create.
 Result<std::vector<PlacedResidency>> openResidencies(const PageMemorySource& memory, const RendererOptions& options,
                                                      std::vector<PlacedDataset> datasets, DatasetImages images = {});
 

@@ -19,13 +19,12 @@ constexpr uint32_t kMostSingleThreads = 16;  // of parts that have one thread ea
 /// Pages are read together with a more urgent one where their urgency is at least this share of its own.
 constexpr double kRunUrgency = 0.5;
 
-uint64_t sizeOf(const Loaded& loaded) {
-    return loaded.bytes ? loaded.bytes->geometryBytes().size() + loaded.bytes->colourBytes().size() : 0;
-}
+uint64_t sizeOf(const Loaded& loaded) { return loaded.bytes ? loaded.bytes->bytes() : 0; }
 
 /// As messages name it.
 std::string elementOf(Request request) {
-    return fmt::format("{} {}", request.isPage() ? "page" : "directory block", request.number);
+    const char* const names[] = {"page", "directory block", "piece of images"};
+    return fmt::format("{} {}", names[size_t(request.kind)], request.number);
 }
 
 // Makes this thread, one of `threads`, less urgent than what started it, by steps of the system's niceness. Each step

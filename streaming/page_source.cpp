@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cstring>
 
+#include "octree/image_needs.h"
+
 namespace vcp {
 
 namespace {
@@ -60,6 +62,8 @@ Result<PageBytes> FilePageSource::readFrom(const ByteReader& bytes, uint64_t pag
         const Extent extent = extentOf(dataset_->pages[page], withColour);
         reader_->distrust(extent.begin, extent.end - extent.begin);
     }
+    if (const auto images = knownImages(); read && images && !read->colour.empty())
+        read->needs = imageNeeds(images->tables(), viewOfChecked(read->geometryBytes(), read->colourBytes()));
     return read;
 }
 
@@ -78,7 +82,9 @@ std::vector<Result<PageBytes>> FilePageSource::readBlocks(uint64_t first, uint32
 }
 
 std::vector<Result<PageBytes>> FilePageSource::readRun(Request first, uint32_t count, bool withColour) const {
-    return first.isPage() ? readPages(first.number, count, withColour) : readBlocks(first.number, count);
+    if (first.isPage()) return readPages(first.number, count, withColour);
+    if (first.kind == Request::Kind::DirectoryBlock) return readBlocks(first.number, count);
+    return readPieces(first.number, count);
 }
 
 std::vector<Result<PageBytes>> FilePageSource::readPages(uint64_t first, uint32_t count, bool withColour) const {
@@ -109,6 +115,7 @@ std::vector<Result<PageBytes>> FilePageSource::readPages(uint64_t first, uint32_
 
 uint32_t FilePageSource::runFrom(Request first, uint32_t most, bool withColour) const {
     if (first.isPage()) return pageRunFrom(first.number, most, withColour);
+    if (first.kind == Request::Kind::ImagePiece) return pieceRunFrom(first.number, most);
     return uint32_t(std::min<uint64_t>(most, dataset_->pages.blocks() - first.number));
 }
 
@@ -124,14 +131,57 @@ uint32_t FilePageSource::pageRunFrom(uint64_t first, uint32_t most, bool withCol
     return count;
 }
 
-Result<std::shared_ptr<const ImageSet>> FilePageSource::readImages(uint64_t mostBytes) const {
-    if (!dataset_->hasImages()) return std::shared_ptr<const ImageSet>();
-    VCP_TRY_ASSIGN(auto images, ImageSet::read(*reader_, dataset_->header.images, mostBytes));
-    return std::shared_ptr<const ImageSet>(std::make_shared<const ImageSet>(std::move(images)));
+Result<std::shared_ptr<const ImagePieces>> FilePageSource::images() const {
+    if (auto known = knownImages(); known || !dataset_->hasImages()) return known;
+    VCP_TRY_ASSIGN(auto read, ImagePieces::read(*reader_, dataset_->header.images));
+    const std::lock_guard lock(mutex_);
+    if (!images_) images_ = std::move(read);
+    return images_;
+}
+
+std::shared_ptr<const ImagePieces> FilePageSource::knownImages() const {
+    const std::lock_guard lock(mutex_);
+    return images_;
+}
+
+uint32_t FilePageSource::pieceRunFrom(uint64_t first, uint32_t most) const {
+    const auto images = knownImages();
+    const uint64_t begin = images->extentOf(images->piece(first)).begin;
+    uint32_t count = 1;
+    while (count < most && first + count < images->count() &&
+           images->extentOf(images->piece(first + count)).end - begin <= runBytes_)
+        ++count;
+    return count;
+}
+
+std::vector<Result<PageBytes>> FilePageSource::readPieces(uint64_t first, uint32_t count) const {
+    const auto images = knownImages();
+    const auto extent = [&](uint32_t i) { return images->extentOf(images->piece(first + i)); };
+    const uint64_t begin = extent(0).begin;
+    std::vector<std::byte> stored(extent(count - 1).end - begin);
+    if (const auto got = reader_->read(begin, stored); !got) return std::vector<Result<PageBytes>>(count, got.error());
+    std::vector<Result<PageBytes>> pieces;
+    for (uint32_t i = 0; i < count; ++i) {
+        auto texels = images->readPiece(Stretch(*reader_, begin, stored), first + i);
+        if (!texels) {
+            reader_->distrust(extent(i).begin, extent(i).bytes());
+            pieces.emplace_back(texels.error());
+            continue;
+        }
+        PageBytes piece;
+        piece.texels = *std::move(texels);
+        pieces.emplace_back(std::move(piece));
+    }
+    return pieces;
 }
 
 uint64_t FilePageSource::bytesToRead(Request request, bool withColour) const {
-    if (!request.isPage()) return kBlockBytes;
+    if (request.kind == Request::Kind::DirectoryBlock) return kBlockBytes;
+    if (request.kind == Request::Kind::ImagePiece) {
+        const auto images = knownImages();
+        const ImagePiece piece = images->piece(request.number);
+        return 2 * images->extentOf(piece).bytes() + piece.texels * sizeof(uint32_t);
+    }
     const PageEntry& entry = dataset_->pages[request.number];
     const uint64_t geometry = 2 * uint64_t{entry.storedBytes} + entry.pageBytes;
     return withColour ? geometry + 2 * uint64_t{entry.colourStoredBytes} + entry.colourBytes : geometry;

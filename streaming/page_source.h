@@ -3,10 +3,11 @@
 
 #include <cstdint>
 #include <memory>
+#include <mutex>
 #include <string>
 #include <vector>
 
-#include "octree/image/image_set.h"
+#include "octree/image/image_pieces.h"
 #include "octree/page_reader.h"
 #include "streaming/request.h"
 #include "streaming/stored_pages.h"
@@ -26,6 +27,7 @@ public:
     virtual ~PageSource() = default;
     /// A page's bytes, verified, decompressed and parsed without complaint (readPage). Colour is empty where the
     /// dataset has none or it is not asked for. Of a block of the directory: no bytes, but its entries are known now.
+    /// Of a piece of images: its texels.
     virtual Result<PageBytes> read(Request request, bool withColour) const = 0;
 
     /// `first` and what follows it, `count` in all, as read() would give each; where they lie together, in one read.
@@ -33,7 +35,8 @@ public:
     /// How many pages or blocks from `first` on are best read together, at most `most`; at least 1.
     [[nodiscard]] virtual uint32_t runFrom(Request first, uint32_t most, bool withColour) const;
 
-    /// Memory that reading a page takes: its stored bytes, twice, and what it returns. Of a block: its bytes.
+    /// Memory that reading a page takes: its stored bytes, twice, and what it returns. Of a block: its bytes; of a
+    /// piece of images: its stored ones and what it returns.
     [[nodiscard]] virtual uint64_t bytesToRead(Request request, bool withColour) const = 0;
     /// Allows the source to keep stored pages in memory, to be read again: from now on at most `bytes`, whatever is
     /// being read. Returns how many bytes are kept. Only the PageLoader that owns the memory calls it.
@@ -42,10 +45,9 @@ public:
     [[nodiscard]] virtual uint32_t partOf([[maybe_unused]] Request request) const { return 0; }
     /// Ends reads that are under way soon, with Cancelled, where they could take long. Later reads work.
     virtual void interrupt() const {}
-    /// Reads the images of the pages' file, as ImageSet::read does; null where it has none.
-    virtual Result<std::shared_ptr<const ImageSet>> readImages([[maybe_unused]] uint64_t mostBytes) const {
-        return std::shared_ptr<const ImageSet>();
-    }
+    /// Returns the images of the pages' file, whose pieces may be asked for then; null where it has none. The first
+    /// call reads their tables. Errors: ImagePieces::read's.
+    virtual Result<std::shared_ptr<const ImagePieces>> images() const { return std::shared_ptr<const ImagePieces>(); }
     /// The name of the pages' file, for errors; empty where there is none, or several.
     [[nodiscard]] virtual std::string name() const { return {}; }
     [[nodiscard]] virtual PageOrigin originOf(Request request) const { return {name(), request}; }
@@ -66,7 +68,7 @@ public:
     [[nodiscard]] uint64_t bytesToRead(Request request, bool withColour) const override;
     uint64_t keepWithin(uint64_t bytes) const override { return kept_.limitTo(bytes); }
     void interrupt() const override { reader_->interrupt(); }
-    Result<std::shared_ptr<const ImageSet>> readImages(uint64_t mostBytes) const override;
+    Result<std::shared_ptr<const ImagePieces>> images() const override;
     [[nodiscard]] std::string name() const override { return reader_->name(); }
 
 private:
@@ -74,11 +76,16 @@ private:
     std::vector<Result<PageBytes>> readPages(uint64_t first, uint32_t count, bool withColour) const;
     [[nodiscard]] uint32_t pageRunFrom(uint64_t first, uint32_t most, bool withColour) const;
     std::vector<Result<PageBytes>> readBlocks(uint64_t first, uint32_t count) const;
+    [[nodiscard]] uint32_t pieceRunFrom(uint64_t first, uint32_t most) const;
+    std::vector<Result<PageBytes>> readPieces(uint64_t first, uint32_t count) const;
+    [[nodiscard]] std::shared_ptr<const ImagePieces> knownImages() const;
 
     std::shared_ptr<const ByteReader> reader_;
     std::shared_ptr<const Dataset> dataset_;
     uint64_t runBytes_;
     mutable StoredPages kept_;
+    mutable std::mutex mutex_;
+    mutable std::shared_ptr<const ImagePieces> images_;  // null until they are asked for
 };
 
 }  // namespace vcp

@@ -63,7 +63,7 @@ public:
     [[nodiscard]] double nextTry(double now) const;
     /// Requests wished for or under way.
     [[nodiscard]] size_t pending() const;
-    /// Elements of all containers: bounded by the dataset's pages and blocks.
+    /// Elements of all containers: bounded by the dataset's pages, blocks and pieces.
     [[nodiscard]] size_t entries() const {
         return wishes_.size() + priorities_.size() + underWay_.size() + over_.size() + givenUp_.size() + trials_.size();
     }

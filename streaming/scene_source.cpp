@@ -6,7 +6,8 @@
 namespace vcp {
 
 SceneSource::SceneSource(std::vector<Part> parts) : parts_(std::move(parts)), limits_(parts_.size()) {
-    for (const Part& part : parts_) numbers_.add(part.dataset->pages.size(), part.dataset->pages.blocks());
+    for (const Part& part : parts_)
+        numbers_.add(part.dataset->pages.size(), part.dataset->pages.blocks(), part.images ? part.images->count() : 0);
 }
 
 Result<PageBytes> SceneSource::read(Request request, bool withColour) const {

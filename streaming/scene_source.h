@@ -15,8 +15,11 @@ public:
     struct Part {
         std::shared_ptr<const Dataset> dataset;
         std::shared_ptr<const PageSource> source;
+        std::shared_ptr<const ImagePieces> images = {};  ///< of the source; null: no pieces are asked for
     };
     explicit SceneSource(std::vector<Part> parts);
+
+    [[nodiscard]] const SceneNumbers& numbers() const { return numbers_; }
 
     Result<PageBytes> read(Request request, bool withColour) const override;
     std::vector<Result<PageBytes>> readRun(Request first, uint32_t count, bool withColour) const override;

@@ -72,14 +72,13 @@ int wholeBelow(float x) {
 }
 
 /// Adds what a level shows at a point, between four texels.
-void addBilinear(glm::vec4& sum, const ImageSet& set, const ImageSet::Level& level, ImageWraps wraps, glm::vec2 at,
-                 float weight) {
+void addBilinear(glm::vec4& sum, const ImageSet::Level& level, ImageWraps wraps, glm::vec2 at, float weight) {
     const int width = int(level.width), height = int(level.height);
     const float x = f32::boundedPlace(at.x * float(width) - 0.5f), y = f32::boundedPlace(at.y * float(height) - 0.5f);
     const int column = wholeBelow(x), row = wholeBelow(y);
     const float fx = x - float(column), fy = y - float(row);
     const glm::ivec2 columns = pairOf(column, width, wraps.u), rows = pairOf(row, height, wraps.v);
-    const uint32_t* const texels = set.texelsOf(level);
+    const uint32_t* const texels = level.texels.get();
     const ColourTables& tables = ColourTables::get();
     const uint32_t* const upper = texels + size_t(rows[0]) * size_t(width);
     const uint32_t* const lower = texels + size_t(rows[1]) * size_t(width);
@@ -89,15 +88,14 @@ void addBilinear(glm::vec4& sum, const ImageSet& set, const ImageSet::Level& lev
 
 }  // namespace
 
-glm::vec4 filteredColour(const ImageSet& set, const ImageSet::Image& image, ImageWraps wraps, glm::vec2 at,
-                         const ImagePlaces& places) {
+glm::vec4 filteredColour(const ImageSet::Image& image, ImageWraps wraps, glm::vec2 at, const ImagePlaces& places) {
     const float part = 1 / float(places.count);
     glm::vec4 sum(0);
     for (int i = 0; i < places.count; ++i) {
         const glm::vec2 place = at + ((float(i) + 0.5f) * part - 0.5f) * places.along;
-        addBilinear(sum, set, image.levels[size_t(places.finer)], wraps, place, (1 - places.coarser) * part);
+        addBilinear(sum, image.levels[size_t(places.finer)], wraps, place, (1 - places.coarser) * part);
         if (places.coarser > 0)
-            addBilinear(sum, set, image.levels[size_t(places.finer) + 1], wraps, place, places.coarser * part);
+            addBilinear(sum, image.levels[size_t(places.finer) + 1], wraps, place, places.coarser * part);
     }
     if (!(sum.w > 0)) return glm::vec4(0);
     const ColourTables& tables = ColourTables::get();

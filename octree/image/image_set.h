@@ -1,7 +1,8 @@
-// The images of a file in memory, decoded, for whoever looks colours up.
+// The levels of a file's images that are in memory, decoded, for whoever looks colours up.
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -9,39 +10,44 @@
 
 namespace vcp {
 
-/// Immutable; any thread may read it.
+/// Copies share the texels, which do not change.
 class ImageSet {
 public:
-    /// A level that is in memory, row by row.
+    /// A level that is in memory.
     struct Level {
-        uint32_t width = 1, height = 1;  ///< texels
-        uint64_t first = 0;              ///< its first texel among those of all levels
+        uint32_t width = 1, height = 1;            ///< texels
+        std::shared_ptr<const uint32_t[]> texels;  ///< RGBA8, row by row
+
+        [[nodiscard]] uint64_t bytes() const { return uint64_t{width} * height * sizeof(uint32_t); }
     };
     struct Image {
         uint32_t width = 1, height = 1;  ///< texels of level 0
-        uint32_t finest = 0;             ///< number of the finest level that is in memory
-        std::vector<Level> levels;       ///< from that one on
+        uint32_t finest = 0;        ///< number of the finest level that is in memory; where there is none, of levels
+        std::vector<Level> levels;  ///< from that one on
     };
 
-    /// Reads all images. Where they take more than `mostBytes`, the finest levels of the largest ones are left out; the
-    /// coarsest level of each is always there. Errors: readImageTables' and decodeTile's.
-    static Result<ImageSet> read(const ByteReader& reader, const ImagesPlace& place, uint64_t mostBytes);
+    ImageSet() = default;
+    /// Images without a level.
+    explicit ImageSet(const ImageTables& tables);
 
     [[nodiscard]] std::span<const Image> images() const { return images_; }
     [[nodiscard]] std::span<const MaterialRow> materials() const { return materials_; }
-    /// The texels of a level, RGBA8.
-    [[nodiscard]] const uint32_t* texelsOf(const Level& level) const { return texels_.data() + level.first; }
-    /// The texels of all levels, image by image.
-    [[nodiscard]] std::span<const uint32_t> texels() const { return texels_; }
-    [[nodiscard]] uint64_t bytes() const { return texels_.size() * sizeof(uint32_t); }
+    [[nodiscard]] uint64_t bytes() const;
+
+    /// Adds the level that is next finer than those there are.
+    void add(uint32_t image, Level level);
+    /// Takes away the levels of an image that are finer than `finest`.
+    void drop(uint32_t image, uint32_t finest);
 
 private:
     std::vector<Image> images_;
     std::vector<MaterialRow> materials_;
-    std::vector<uint32_t> texels_;
 };
 
-/// Returns, for each image, the number of the finest level that is kept where all may take `mostBytes` together.
-std::vector<uint32_t> finestWithin(std::span<const ImageRow> images, uint64_t mostBytes);
+/// Coarsens what images have until all levels from there on take `mostBytes` together, or none may go: the largest ones
+/// go first. `finest`: for each image, the number of its finest level, that of levels where it has none; `coarsest`:
+/// the most that it may become.
+std::vector<uint32_t> finestWithin(std::span<const ImageRow> images, std::vector<uint32_t> finest,
+                                   const std::vector<uint32_t>& coarsest, uint64_t mostBytes);
 
 }  // namespace vcp

@@ -35,7 +35,7 @@ public:
         if (t == nullptr) return colourAt(scene_, hits_, pixel);
         const float depth = hits_.depth[pixel];
         if (!(std::abs(depth - t->depth) <= kSameFootprint * t->depth)) setPlaces(*t, pixel, viewOf());
-        return t->triangle.factor * filteredColour(*scene_.images(), *t->triangle.image, t->triangle.wraps,
+        return t->triangle.factor * filteredColour(*t->triangle.image, t->triangle.wraps,
                                                    t->triangle.at(hits_.x[pixel], hits_.y[pixel]), t->places);
     }
 

@@ -65,10 +65,10 @@ public:
     };
     using Node = std::array<Child, 8>;  ///< child i at octant x + 2y + 4z
 
-    /// Lets triangles that have images be seen in them, and not in the colours of their vertices. `images`: the file's,
-    /// of which pages were checked to name no other materials; null: none. It must outlive the scene.
-    void showImages(const ImageSet* images) { images_ = images; }
-    [[nodiscard]] const ImageSet* images() const { return images_; }
+    /// Lets triangles that have images be seen in them, and not in the colours of their vertices. `images`: the file's;
+    /// null: none.
+    void showImages(std::shared_ptr<const ImageSet> images) { images_ = std::move(images); }
+    [[nodiscard]] const ImageSet* images() const { return images_.get(); }
 
     [[nodiscard]] const HostGrid& grid() const { return grid_; }
     [[nodiscard]] Child root() const { return root_; }
@@ -85,7 +85,7 @@ private:
     Result<void> add(const HostPage& page);
 
     HostGrid grid_;
-    const ImageSet* images_ = nullptr;
+    std::shared_ptr<const ImageSet> images_;
     Child root_;
     std::vector<Node> nodes_;
     std::vector<Page> pages_;

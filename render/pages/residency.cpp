@@ -15,7 +15,15 @@ Residency::ViewCut& Residency::current(ViewNumber number) {
 }
 
 void Residency::take(DrawableCut drawable, ViewCut& cut) {
-    if (cut.number == 0 || drawable.cut != cut.pages || drawable.partial != cut.partial) cut.number = ++cutsDrawn_;
+    if (cut.number == 0 || drawable.cut != cut.pages || drawable.partial != cut.partial) {
+        cut.number = cut.pagesNumber = ++cutsDrawn_;
+    } else if (cut.imagesVersion != imagesVersion()) {
+        // Rays hit the same pages, whatever colours these have.
+        const bool isAnswered = cut.answered == cut.number;
+        cut.number = ++cutsDrawn_;
+        if (isAnswered) cut.answered = cut.number;
+    }
+    cut.imagesVersion = imagesVersion();
     cut.pages = std::move(drawable.cut);
     cut.partial = std::move(drawable.partial);
     cut.pagesUnseen = drawable.pagesUnseen;
@@ -28,6 +36,8 @@ UpdateResult Residency::cutOf(const SelectionView& view, const DrawableCut& draw
     cut.view = view;
     take(drawable, cut);
     UpdateResult result = report(drawable, cut);
+    result.settled = result.settled && (!images_ || images_->isComplete(number));
+    result.relaxed = result.relaxed || (images_ && images_->isLimited(number));
     result.changed = std::exchange(cut.reported, cut.number) != cut.number;
     return result;
 }
@@ -53,6 +63,7 @@ UpdateResult Residency::report(const DrawableCut& drawable, const ViewCut& drawn
 
 void Residency::forgetView(ViewNumber number) {
     scene_.policy_->forgetView(number, number_);
+    if (images_) images_->forgetView(number);
     cuts_.erase(number);
 }
 
@@ -74,7 +85,8 @@ void Residency::surroundWith(uint64_t others, ViewNumber number) {
 }
 
 bool Residency::hasAll(const std::vector<uint64_t>& pages) const { return scene_.policy_->hasAll(pages, number_); }
-uint64_t Residency::version() const { return scene_.policy_->version(number_); }
+uint64_t Residency::version() const { return scene_.policy_->version(number_) + imagesVersion(); }
+
 const PageMemory& Residency::pages() const { return scene_.pages(); }
 
 PoolSlot Residency::slotOf(uint64_t page) const {

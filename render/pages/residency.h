@@ -6,6 +6,7 @@
 #include <memory>
 #include <vector>
 
+#include "render/pages/image_residency.h"
 #include "render/pages/page_memory.h"
 #include "render/pages/page_table.h"
 #include "render/pages/update_result.h"
@@ -17,9 +18,9 @@ class SceneResidency;
 
 class Residency {
 public:
-    /// `scene` must outlive it.
-    Residency(SceneResidency& scene, size_t number, PooledDataset dataset)
-        : scene_(scene), number_(number), dataset_(std::move(dataset)) {}
+    /// `scene` must outlive it. `images`: null, where the colours of vertices are shown.
+    Residency(SceneResidency& scene, size_t number, PooledDataset dataset, std::unique_ptr<ImageResidency> images)
+        : scene_(scene), number_(number), dataset_(std::move(dataset)), images_(std::move(images)) {}
 
     /// Among the datasets of its scene.
     [[nodiscard]] size_t number() const { return number_; }
@@ -36,8 +37,10 @@ public:
     [[nodiscard]] bool listens() const;
     void hear(const RayFeedback& feedback, const SelectionView& view);
 
-    /// A number of what the view draws: frames of one cut have the same.
+    /// A number of what the view draws: frames of one cut, with the same levels of images, have the same.
     [[nodiscard]] uint64_t cutNumber(ViewNumber number = 0) { return current(number).number; }
+    /// The same of the pages alone.
+    [[nodiscard]] uint64_t pagesNumber(ViewNumber number = 0) { return current(number).pagesNumber; }
     /// Whether the view's next frame is to say which pages its rays hit: some that could be refined are in the cut, and
     /// no frame of it has said so yet.
     [[nodiscard]] bool asksRays(ViewNumber number = 0) {
@@ -59,13 +62,21 @@ public:
     /// Those of them that it draws only in some octants.
     [[nodiscard]] const std::vector<PartialPage>& partial(ViewNumber number = 0) { return current(number).partial; }
     [[nodiscard]] std::vector<frame::TableRecord> table(ViewNumber number = 0);
-    /// A number that changes whenever the page table may: with another cut, or with pages in other places.
+    /// A number that changes whenever the page table may, or the images: with another cut, or with pages in other
+    /// places.
     [[nodiscard]] uint64_t version() const;
     /// The pool, which holds the pages of all datasets of the scene.
     [[nodiscard]] const PageMemory& pages() const;
     /// Returns the slot of a page that is resident.
     [[nodiscard]] PoolSlot slotOf(uint64_t page) const;
     [[nodiscard]] bool hasColour() const { return dataset_.withColour; }
+    /// The levels of the file's images to draw from, the same until the scene's next update; null: the colours of
+    /// vertices are shown.
+    [[nodiscard]] std::shared_ptr<const ImageSet> images() const { return images_ ? images_->shown() : nullptr; }
+    /// Counts the sets of levels.
+    [[nodiscard]] uint64_t imagesVersion() const { return images_ ? images_->version() : 0; }
+    /// The most bytes that these take.
+    [[nodiscard]] uint64_t mostImageBytes() const { return images_ ? images_->mostBytes() : 0; }
     [[nodiscard]] std::vector<uint64_t> residentPages() const;
     /// Bytes of colour of the dataset's pages in the pool.
     [[nodiscard]] uint64_t colourBytes() const;
@@ -75,6 +86,8 @@ private:
         std::vector<uint64_t> pages;
         std::vector<PartialPage> partial;
         uint64_t version = UINT64_MAX;
+        uint64_t imagesVersion = 0;
+        uint64_t pagesNumber = 0;           // of its pages, whatever the images
         uint64_t number = 0, reported = 0;  // of the cut, and of that of its last update
         uint64_t answered = 0;              // of the cut of which a frame of this view said what its rays hit
         uint64_t others = 0;                // as surroundWith() said
@@ -86,9 +99,11 @@ private:
     void take(DrawableCut drawable, ViewCut& cut);
     UpdateResult report(const DrawableCut& drawable, const ViewCut& drawn) const;
 
+    friend class SceneResidency;
     SceneResidency& scene_;
     const size_t number_;
     const PooledDataset dataset_;
+    const std::unique_ptr<ImageResidency> images_;
     std::map<ViewNumber, ViewCut> cuts_;
     uint64_t cutsDrawn_ = 0;  // number of the last cut
 };

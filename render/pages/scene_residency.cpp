@@ -16,7 +16,9 @@ Result<std::shared_ptr<SceneResidency>> SceneResidency::create(const PageMemoryS
     std::shared_ptr<SceneResidency> made(new SceneResidency(options));
     for (const SceneSource::Part& each : datasets) {
         made->pooled_.push_back({each.dataset, options.loader.withColour && each.dataset->hasColour()});
-        made->datasets_.emplace_back(*made, made->datasets_.size(), made->pooled_.back());
+        const size_t number = made->datasets_.size();
+        auto images = each.images ? std::make_unique<ImageResidency>(each.images, options.imageBytes[number]) : nullptr;
+        made->datasets_.emplace_back(*made, number, made->pooled_.back(), std::move(images));
     }
     made->listens_.resize(datasets.size());
     made->source_ = std::make_shared<const SceneSource>(std::move(datasets));
@@ -73,7 +75,7 @@ Result<std::vector<SceneResidency::CarriedPage>> SceneResidency::carryOut() {
     for (const Residency& each : datasets_) {
         for (const uint64_t page : each.residentPages()) {
             const PageEntry& entry = each.dataset().pages[page];
-            places.push_back({entry.level, policy_->numbers().firstPage(each.number()) + page,
+            places.push_back({entry.level, numbers().firstPage(each.number()) + page,
                               uint64_t{entry.pageBytes} + (each.hasColour() ? entry.colourBytes : 0)});
         }
     }
@@ -96,7 +98,8 @@ Result<void> SceneResidency::setBudgets(const PageMemorySource& memory, uint64_t
     options_.budgetBytes = budgetBytes;
     options_.loader.heldBytes = ramBytes;
     startLoader();  // what the old loader held is gone
-    for (const Request request : std::exchange(tooLarge_, {})) policy_->restore(request);
+    for (const Request request : std::exchange(tooLarge_, {}))
+        if (request.kind != Request::Kind::ImagePiece) policy_->restore(request);
     if (pool_ && shape.units * kPoolUnitBytes == pool_->bytes()) return {};
     VCP_TRY_ASSIGN(auto carried, pool_ ? carryOut() : std::vector<CarriedPage>());
     VCP_TRY(rebuild(memory));
@@ -128,18 +131,19 @@ void SceneResidency::forgetView(ViewNumber number) {
 Result<SceneResidency::Update> SceneResidency::update(std::span<const std::optional<SelectionView>> views,
                                                       ViewNumber number) {
     std::vector<Loaded> loaded = loader_->collect(uploadBytes());
-    for (const Loaded& page : loaded) {
-        if (page.bytes || !policy_->giveUp(page.request)) continue;
-        problems_.push_back(page.bytes.error());
-        if (page.bytes.error().code == ErrorCode::Limit) tooLarge_.push_back(page.request);
-    }
+    for (const Loaded& each : loaded)
+        if (!each.bytes) giveUp(each);
     policy_->look(views, steadySeconds(), number);
-    for (const Loaded& page : loaded) {
-        if (!page.bytes || !page.request.isPage()) continue;
-        if (auto placed = place(page.request.number, *page.bytes); !placed) return placed.error();
+    for (const Loaded& each : loaded) {
+        if (!each.bytes) continue;
+        if (each.request.isPage()) VCP_TRY(place(each.request.number, *each.bytes));
+        if (each.request.kind == Request::Kind::ImagePiece)
+            datasets_[numbers().datasetOf(each.request)].images_->take(numbers().inDataset(each.request).number,
+                                                                       each.bytes->texels);
     }
     VCP_TRY(pool_->flush());
     PolicyOutcome outcome = policy_->finish(number);
+    std::ranges::move(imageWishes(views, outcome.cuts, number), std::back_inserter(outcome.wishes));
     loader_->request(std::move(outcome.wishes), uploadBytes());
     for (size_t i = 0; i < datasets_.size(); ++i)
         listens_[i] = outcome.missing[i] > 0 && options_.order == LoadOrder::Feedback;
@@ -159,6 +163,31 @@ Result<SceneResidency::Update> SceneResidency::update(std::span<const std::optio
     return Update{std::move(all), std::move(outcome.cuts)};
 }
 
+void SceneResidency::giveUp(const Loaded& failed) {
+    const Request request = failed.request;
+    if (request.kind == Request::Kind::ImagePiece)
+        datasets_[numbers().datasetOf(request)].images_->giveUp(numbers().inDataset(request).number);
+    else if (!policy_->giveUp(request))
+        return;
+    problems_.push_back(failed.bytes.error());
+    if (failed.bytes.error().code == ErrorCode::Limit) tooLarge_.push_back(request);
+}
+
+std::vector<Wish> SceneResidency::imageWishes(std::span<const std::optional<SelectionView>> views,
+                                              std::span<const DrawableCut> cuts, ViewNumber number) {
+    std::vector<Wish> wishes;
+    for (Residency& each : datasets_) {
+        if (!each.images_) continue;
+        if (const auto& view = views[each.number()])
+            each.images_->look(each.dataset(), *view, cuts[each.number()].cut, number);
+        else
+            each.images_->forgetView(number);
+        for (const Wish& wish : each.images_->wishes())
+            wishes.push_back({numbers().inScene(each.number(), wish.request), wish.priority});
+    }
+    return wishes;
+}
+
 Result<std::optional<PoolSlot>> SceneResidency::slotFor(uint64_t page) {
     const Placement placement = policy_->place(page);
     for (const PageMove& move : placement.moves) VCP_TRY(pool_->move(move.from, move.to));
@@ -169,9 +198,12 @@ Result<void> SceneResidency::place(uint64_t page, const PageBytes& bytes) {
     VCP_TRY_ASSIGN(const auto slot, slotFor(page));
     if (!slot) return {};
     const std::span geometry = bytes.geometryBytes();
+    const size_t dataset = numbers().datasetOf(page);
+    if (const auto& images = datasets_[dataset].images_)
+        images->learn(page - numbers().firstPage(dataset), bytes.needs);
     PageRoot& root = roots_[page];
     // Pages of the other method have all they need in a header of their own, which the shader reads.
-    if (pooled_[policy_->numbers().datasetOf(page)].dataset->header.method == Method::Certified) {
+    if (pooled_[dataset].dataset->header.method == Method::Certified) {
         const PageView view = viewOfChecked(geometry, {});
         root.header = view.header;
         if (nodeType(view.header.root) == kNodeInternal)

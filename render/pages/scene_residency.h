@@ -30,7 +30,8 @@ struct ResidencyOptions {
     uint64_t budgetBytes = 512ull << 20;  ///< bytes of the pool
     uint64_t uploadBytes = 16ull << 20;   ///< taken in by one update, half of it while a view moves; one page at least
     LoadOrder order = LoadOrder::Feedback;
-    bool hiddenToo = false;  ///< views want what no ray hits, too
+    bool hiddenToo = false;            ///< views want what no ray hits, too
+    std::vector<uint64_t> imageBytes;  ///< by dataset, most bytes of its images in memory
     LoaderOptions loader;
 };
 
@@ -84,12 +85,17 @@ private:
     /// Returns a slot for the page, with pages moved out of its way; nothing where there is none.
     Result<std::optional<PoolSlot>> slotFor(uint64_t page);
     Result<void> place(uint64_t page, const PageBytes& bytes);
+    void giveUp(const Loaded& failed);
+    /// Tells the images what a view draws, and returns the pieces of them to read.
+    std::vector<Wish> imageWishes(std::span<const std::optional<SelectionView>> views,
+                                  std::span<const DrawableCut> cuts, ViewNumber number);
     /// The error of a pool of so many bytes without room for the coarsest pages.
     [[nodiscard]] Error lacksRoom(uint64_t budgetBytes, const ResidencyPolicy& policy) const;
     /// Bytes that one update takes in, and that the loader reads before it.
     [[nodiscard]] uint64_t uploadBytes() const {
         return std::max<uint64_t>(1, policy_->isMoving() ? options_.uploadBytes / 2 : options_.uploadBytes);
     }
+    [[nodiscard]] const SceneNumbers& numbers() const { return source_->numbers(); }
     struct PageRoot {
         PageHeader header;
         std::array<uint32_t, 8> octants{};  // words of the root's octants, where it is an internal node

@@ -18,7 +18,8 @@ struct UpdateResult {
     double errorPixels = 0;   ///< largest projected certified error in the cut (inf without a page or certificate)
     uint64_t residentBytes = 0;  ///< geometry and colour pages in the pool
     uint64_t bytesRead = 0;      ///< decompressed page bytes the loader has delivered since open()
-    bool relaxed = false;        ///< the budget is too small for the view's pixel error; errorPixels is what it reaches
+    bool relaxed = false;  ///< the budget is too small for the view's pixel error, which errorPixels reaches, or the
+                           ///< memory for images for all of their levels that it needs
     uint64_t heldBytesMax =
         0;  ///< most memory that pages took between source and pool, and stored ones kept, since open() or setBudgets()
     uint64_t loads = 0, evictions = 0;        ///< pages into and out of the pool since open()

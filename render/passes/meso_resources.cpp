@@ -47,7 +47,8 @@ Result<MesoTexels> MesoResources::words(std::span<const uint32_t> words) {
                      .message = fmt::format("a mesostructure of {} words; this device reads {} at most", words.size(),
                                             device_.limits().maxTexelBufferElements)};
     MesoTexels made;
-    VCP_TRY_ASSIGN(auto buffer, device_.createFilled({std::as_bytes(words)}, VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT));
+    const std::span bytes = std::as_bytes(words);
+    VCP_TRY_ASSIGN(auto buffer, device_.createFilled({&bytes, 1}, VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT));
     made.buffer = std::move(buffer);
     VCP_TRY_ASSIGN(made.view, device_.createTexelView(made.buffer, VK_FORMAT_R32_UINT, words.size_bytes()));
     VCP_TRY_ASSIGN(made.quads, device_.createTexelView(made.buffer, VK_FORMAT_R32G32B32A32_UINT, words.size_bytes()));
@@ -62,7 +63,7 @@ Result<MesoTexels> MesoResources::texels(std::span<const std::byte> bytes, uint3
                      .message = fmt::format("{} texels of {}; this device reads {} at most", count, what,
                                             device_.limits().maxTexelBufferElements)};
     MesoTexels made;
-    VCP_TRY_ASSIGN(auto buffer, device_.createFilled({bytes}, VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT));
+    VCP_TRY_ASSIGN(auto buffer, device_.createFilled({&bytes, 1}, VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT));
     made.buffer = std::move(buffer);
     VCP_TRY_ASSIGN(made.view, device_.createTexelView(made.buffer, format, bytes.size()));
     return made;

@@ -2,8 +2,8 @@
 // them. The words of the images (render/passes/image_words.h):
 //
 //   4 words            the number of materials; 0
-//   4 words a material where its image begins; RGBA8 that multiplies what the image shows; how it goes on beyond its
-//                      edges, along u and, from bit 8 on, along v; 0
+//   4 words a material where its image begins, 0 where no level of it is here; RGBA8 that multiplies what the image
+//                      shows; how it goes on beyond its edges, along u and, from bit 8 on, along v; 0
 //   4 words an image   width and height of its level 0; number of its finest level here, and how many there are from
 //                      that one on; then 4 words a level: width, height, its first texel, 0
 //   1 word a texel     RGBA8, row by row

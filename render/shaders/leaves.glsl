@@ -282,7 +282,8 @@ vec4 triangleColour(Hit hit, vec3 a, vec3 b, vec3 c, vec3 n, uint colourVertices
     while (hasPoints) {
         uint vertices = fetchWord(record.pageTexel, kPageHeaderVertices);
         ImagePoint first = fetchImagePoint(colourVertices, vertices, hit.corners.x);
-        bool hasImage = first.material != 0u && first.material <= imageWords[0];
+        bool hasImage =
+            first.material != 0u && first.material <= imageWords[0] && imageRecord(4u * first.material).x != 0u;
         while (hasImage) {
             ImagedTriangle t = imagedTriangle(first, fetchImagePoint(colourVertices, vertices, hit.corners.y),
                                               fetchImagePoint(colourVertices, vertices, hit.corners.z));

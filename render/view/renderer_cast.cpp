@@ -31,8 +31,7 @@ std::vector<HostDataset> Renderer::View::hostDatasets() const {
     std::vector<HostDataset> datasets;
     for (size_t i = 0; i < layers.size(); ++i)
         if (const Layer& layer = layers[i]; layer.residency != nullptr)
-            datasets.push_back({*layer.residency, layer.placement, uint32_t(i), layer.errorPixels, number,
-                                shared->datasets[layer.number].images.get()});
+            datasets.push_back({*layer.residency, layer.placement, uint32_t(i), layer.errorPixels, number});
     return datasets;
 }
 

@@ -30,7 +30,7 @@ PassConstants Renderer::View::constantsFor(const Layer& layer, const FrameReques
         c.poolChunks = poolOf(*residency).chunks();
         c.chunkShift = poolOf(*residency).chunkShift();
         c.colour = residency->hasColour();
-        c.images = shared->datasets[layer.number].images != nullptr;
+        c.images = residency->images() != nullptr;
     }
     c.falseColour = hasHitNumbers(request.shading.mode);
     c.countSteps = request.countSteps || showsWork(request.shading.mode);
@@ -85,7 +85,9 @@ Result<void> Renderer::View::prepare(Frame& frame, size_t i) {
     VCP_TRY(resources.resize({request.width, request.height}, hitPlanes(request, constants.colour)));
     resources.setBackground(backgroundRows(request));
     VCP_TRY(prepareTable(layer, drawing));
-    resources.setImages(constants.images ? &shared->images[layer.number] : nullptr);
+    drawing.imagesVersion = layer.residency != nullptr ? layer.residency->imagesVersion() : 0;
+    drawing.images = constants.images ? shared->images[layer.number].words : nullptr;
+    resources.setImages(drawing.images.get());
     if (shared->composes()) {
         VCP_TRY(frame.target.resize(*shared->device, resources.size(), frame.isLit));
         resources.setTarget(&frame.layers.front().resources->picture(), &frame.target.depths(), frame.target.light());

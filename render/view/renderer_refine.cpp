@@ -46,6 +46,8 @@ Result<uint32_t> Renderer::View::drawPart() {
     for (size_t i = 0; i < layers.size(); ++i) {
         refreshTable(layers[i]);
         if (layers[i].tableNumber != shown.layers[i].tableNumber) return 0u;
+        const Residency* const residency = layers[i].residency;
+        if (residency != nullptr && residency->imagesVersion() != shown.layers[i].imagesVersion) return 0u;
     }
     Frame& frame = frames[kRefiningFrame];
     VCP_TRY(shared->device->waitFor(frame.lastUse));

@@ -45,10 +45,17 @@ Result<void> Renderer::Shared::uploadSurfaces() {
 }
 
 Result<void> Renderer::Shared::needImages(size_t dataset) {
-    if (!datasets[dataset].images) return {};
+    const Residency& residency = *datasets[dataset].residency;
+    const auto shown = residency.images();
+    if (!shown) return {};
     images.resize(datasets.size());
-    if (images[dataset].handle() != VK_NULL_HANDLE) return {};
-    VCP_TRY_ASSIGN(images[dataset], uploadImages(*device, *datasets[dataset].images));
+    DeviceImages& there = images[dataset];
+    if (there.words && there.version == residency.imagesVersion()) return {};
+    VCP_TRY(device->waitForAll());
+    there = {};
+    for (View* view : views) view->forgetImages();
+    VCP_TRY_ASSIGN(auto words, uploadImages(*device, *shown));
+    there = {residency.imagesVersion(), std::make_shared<const Buffer>(std::move(words))};
     return {};
 }
 
@@ -57,9 +64,9 @@ Result<void> Renderer::Shared::addDatasets(std::vector<PlacedDataset> placed) {
     RendererOptions left = options;
     VCP_TRY_ASSIGN(const auto beside, pageBudget(options.budgetBytes));
     const uint64_t most = std::min({budgetOfImages(beside), options.ramBytes / 2, mostImageBytes(*device)});
-    VCP_TRY_ASSIGN(auto read, readImages(placed, options.colour, most));
-    VCP_TRY_ASSIGN(left.budgetBytes, budgetOfPages(beside, bytesOf(read)));
-    VCP_TRY_ASSIGN(auto opened, openResidencies(poolsOf(*device, access), left, std::move(placed), std::move(read)));
+    VCP_TRY_ASSIGN(auto found, findImages(placed, options.colour, most));
+    VCP_TRY_ASSIGN(left.budgetBytes, budgetOfPages(beside, found.bytes()));
+    VCP_TRY_ASSIGN(auto opened, openResidencies(poolsOf(*device, access), left, std::move(placed), std::move(found)));
     std::move(opened.begin(), opened.end(), std::back_inserter(datasets));
     return showPool();
 }

@@ -32,7 +32,12 @@ struct Renderer::Shared {
     PageAccess access = PageAccess::TexelBuffer;
     uint32_t stripes = 1;
     std::vector<PlacedResidency> datasets;
-    std::vector<Buffer> images;                // of the datasets, on the device, where a pass has read them
+    /// The images of a dataset on the device.
+    struct DeviceImages {
+        uint64_t version = 0;                 // Residency::imagesVersion
+        std::shared_ptr<const Buffer> words;  // frames keep those that they read
+    };
+    std::vector<DeviceImages> images;          // of the datasets, where a pass has read them
     std::pair<uint32_t, uint32_t> poolLayout;  // chunks and their shift, which the pipelines were made for
     uint32_t losses = 0;
     // Views record their frames one after the other, so one set of pipelines is enough for all.
@@ -69,8 +74,9 @@ struct Renderer::Shared {
     }
     /// Bytes of the surfaces, which the budget pays for before pages.
     [[nodiscard]] uint64_t surfaceBytes() const { return meso && meso->pass ? meso->pass->assetBytes() : 0; }
-    /// Copies the images of a dataset to the device, unless they are there or there are none; waits for it. Not while
-    /// commands are recorded. Errors: as of uploadImages.
+    /// Copies the images that a dataset shows now to the device, unless they are there or there are none; waits for it,
+    /// and for all that is in flight. Those before go, but where a frame is drawn in steps. Not while commands are
+    /// recorded. Errors: as of uploadImages.
     Result<void> needImages(size_t dataset);
     /// Returns what the surfaces and the images leave of a budget for pages. Errors: Limit, where that is too little.
     Result<uint64_t> pageBudget(uint64_t budgetBytes) const {

@@ -95,6 +95,17 @@ void Renderer::View::bindPools(Frame& frame) {
         const PagePool* pool = residency != nullptr ? &poolOf(*residency) : nullptr;
         frame.layers[i].resources->setPools(pool, pool != nullptr && residency->hasColour() ? pool : nullptr);
         frame.layers[i].resources->setImages(nullptr);
+        frame.layers[i].images.reset();
+    }
+}
+
+void Renderer::View::forgetImages() {
+    for (Frame& frame : frames) {
+        if (frame.isUnfinished() && frame.nextStep > 0) continue;
+        for (LayerFrame& layer : frame.layers) {
+            layer.resources->setImages(nullptr);
+            layer.images.reset();
+        }
     }
 }
 

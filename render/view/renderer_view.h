@@ -81,6 +81,8 @@ struct Renderer::View {
         FeedbackTarget feedback;
         PassTimer timer;
         PassConstants constants;
+        std::shared_ptr<const Buffer> images;  // that it reads
+        uint64_t imagesVersion = 0;
         FrameRequest request;      // as seen from the dataset
         uint64_t tableNumber = 0;  // of the table that the resources have
         bool listened = false;     // the frame has a feedback pass
@@ -167,6 +169,9 @@ struct Renderer::View {
     Result<void> showDatasets();
     /// Lets the frame's shaders see the layers' pools.
     void bindPools(Frame& frame);
+    /// Lets go of the images that frames have read, but those that go on being drawn. Precondition: nothing is in
+    /// flight.
+    void forgetImages();
     /// Whether each dataset has its layer; false where the device failed half-way.
     [[nodiscard]] bool isComplete() const;
     /// Lets the layers draw what the request does not hide; waits for frames in flight where that is news. Errors:

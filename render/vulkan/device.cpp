@@ -216,34 +216,39 @@ Result<Buffer> Device::createBuffer(uint64_t bytes, VkBufferUsageFlags usage, Me
     return made;
 }
 
-Result<Buffer> Device::createFilled(std::initializer_list<std::span<const std::byte>> parts, VkBufferUsageFlags usage) {
-    uint64_t bytes = 0, at = 0;
+Result<Buffer> Device::createFilled(std::span<const std::span<const std::byte>> parts, VkBufferUsageFlags usage) {
+    constexpr uint64_t kStagedBytes = 16ull << 20;
+    uint64_t bytes = 0, done = 0, staged = 0;
     for (const auto part : parts) bytes += part.size();
     VCP_TRY_ASSIGN(auto filled, createBuffer(bytes, usage | VK_BUFFER_USAGE_TRANSFER_DST_BIT, MemoryUse::Local));
-    for (const auto part : parts) {
-        VCP_TRY(fill(filled, at, part));
-        at += part.size();
+    Buffer staging;
+    if (filled.mapped() == nullptr) {
+        VCP_TRY_ASSIGN(
+            staging, createBuffer(std::min(bytes, kStagedBytes), VK_BUFFER_USAGE_TRANSFER_SRC_BIT, MemoryUse::Upload));
     }
+    const auto send = [&]() -> Result<void> {
+        const VkBufferCopy region{0, done, std::exchange(staged, 0)};
+        done += region.size;
+        return submitAndWait([&](VkCommandBuffer commands) {
+            vkCmdCopyBuffer(commands, staging.handle(), filled.handle(), 1, &region);
+        });
+    };
+    for (auto rest : parts) {
+        if (filled.mapped() != nullptr) {
+            std::ranges::copy(rest, filled.mapped() + done);
+            done += rest.size();
+            continue;
+        }
+        while (!rest.empty()) {
+            const auto some = rest.first(std::min<uint64_t>(rest.size(), staging.bytes() - staged));
+            std::ranges::copy(some, staging.mapped() + staged);
+            rest = rest.subspan(some.size());
+            staged += some.size();
+            if (staged == staging.bytes()) VCP_TRY(send());
+        }
+    }
+    if (staged > 0) VCP_TRY(send());
     return filled;
-}
-
-Result<void> Device::fill(const Buffer& buffer, uint64_t at, std::span<const std::byte> bytes) {
-    if (std::byte* const mapped = buffer.mapped()) {
-        std::ranges::copy(bytes, mapped + at);
-        return {};
-    }
-    constexpr uint64_t kStagedBytes = 16ull << 20;
-    VCP_TRY_ASSIGN(const auto staging, createBuffer(std::min<uint64_t>(bytes.size(), kStagedBytes),
-                                                    VK_BUFFER_USAGE_TRANSFER_SRC_BIT, MemoryUse::Upload));
-    for (uint64_t done = 0; done < bytes.size(); done += staging.bytes()) {
-        const auto part = bytes.subspan(done, std::min<uint64_t>(staging.bytes(), bytes.size() - done));
-        std::ranges::copy(part, staging.mapped());
-        VCP_TRY(submitAndWait([&](VkCommandBuffer commands) {
-            const VkBufferCopy region{0, at + done, part.size()};
-            vkCmdCopyBuffer(commands, staging.handle(), buffer.handle(), 1, &region);
-        }));
-    }
-    return {};
 }
 
 Result<void> Device::allocate(Buffer& made, VkBufferUsageFlags usage, MemoryUse use) const {

@@ -111,7 +111,7 @@ public:
     Result<Buffer> createBuffer(uint64_t bytes, VkBufferUsageFlags usage, MemoryUse use) const;
     /// Makes a buffer in the device's memory that holds `parts`, one after the other. Where the CPU does not see that
     /// memory, it waits for the copies: not while commands are recorded. Errors: Device.
-    Result<Buffer> createFilled(std::initializer_list<std::span<const std::byte>> parts, VkBufferUsageFlags usage);
+    Result<Buffer> createFilled(std::span<const std::span<const std::byte>> parts, VkBufferUsageFlags usage);
     /// Returns a memory type among the bits `allowed`. Errors: Device.
     Result<uint32_t> memoryType(uint32_t allowed, MemoryUse use) const;
     Result<TexelView> createTexelView(const Buffer& buffer, VkFormat format, uint64_t bytes) const;
@@ -148,7 +148,6 @@ public:
 
 private:
     Device() = default;
-    Result<void> fill(const Buffer& buffer, uint64_t at, std::span<const std::byte> bytes);
     Result<void> allocate(Buffer& buffer, VkBufferUsageFlags usage, MemoryUse use) const;
     void describe(VkPhysicalDevice physical, const DeviceInfo& info);
     [[nodiscard]] std::vector<VkQueueFamilyProperties> queueFamilies() const;

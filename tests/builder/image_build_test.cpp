@@ -8,11 +8,11 @@
 
 #include "builder/build.h"
 #include "builder/texture/texture.h"
-#include "octree/image/image_set.h"
 #include "octree/reference_caster.h"
 #include "octree/surface/packing.h"
 #include "octree/vcp_verify.h"
 #include "tests/support/build_in_parts.h"
+#include "tests/support/image_file.h"
 #include "tests/support/mesh_files.h"
 #include "tests/support/test_folder.h"
 #include "tests/support/test_meshes.h"
@@ -64,7 +64,7 @@ TEST_F(ImageBuild, KeepsImagesAndWhereTheyLie) {
     EXPECT_EQ(h.images.images, 2u);
     EXPECT_EQ(h.images.materials, 2u);
     // Each image's levels are those that colours were filtered from.
-    const auto set = ImageSet::read(**file, h.images, ~uint64_t{0});
+    const auto set = test::wholeImages(**file, h.images);
     ASSERT_TRUE(set.ok());
     const char* names[] = {"floor.png", "wall.png"};
     for (size_t i = 0; i < 2; ++i) {
@@ -72,7 +72,7 @@ TEST_F(ImageBuild, KeepsImagesAndWhereTheyLie) {
         ASSERT_EQ(set->images()[i].levels.size(), texture.levels().size());
         for (size_t l = 0; l < texture.levels().size(); ++l)
             EXPECT_TRUE(std::equal(texture.levels()[l].texels.begin(), texture.levels()[l].texels.end(),
-                                   set->texelsOf(set->images()[i].levels[l])));
+                                   set->images()[i].levels[l].texels.get()));
     }
     // Each vertex of the finest triangles is where its place in the world says, to a quarter of 1/32 texel and the
     // lattice's rounding; and all triangles of a wall have its material.

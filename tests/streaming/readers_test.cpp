@@ -9,6 +9,7 @@
 #include "streaming/faulty_reader.h"
 #include "streaming/page_source.h"
 #include "streaming/read_ahead.h"
+#include "tests/support/image_file.h"
 #include "tests/support/test_files.h"
 #include "tests/support/test_folder.h"
 
@@ -247,6 +248,57 @@ TEST(PageSource, RunsGiveTheSamePagesInFewerReads) {
         EXPECT_EQ(runs == pages, runBytes == 0);
         EXPECT_EQ(runs == 1, runBytes == uint64_t{1} << 30);
     }
+}
+
+TEST(PageSource, PiecesOfImagesThatLieTogetherAreReadTogether) {
+    const TestFolder folder("vcp_page_source_test");
+    test::StoredImages stored;
+    for (const uint32_t edge : {700u, 90u, 30u}) stored.add(test::randomImage(edge, edge, edge));
+    stored.tables.materials = {{}};
+    test::writeImageFile(folder / "images.vcp", stored);
+    const auto reader = std::make_shared<CountingReader>(*openFile(folder / "images.vcp"));
+    const auto dataset = std::make_shared<const Dataset>(*readDataset(*reader));
+    for (const uint64_t runBytes : {uint64_t{0}, uint64_t{400000}, uint64_t{1} << 30}) {
+        const FilePageSource source(reader, dataset, runBytes);
+        const auto images = *source.images();
+        const auto pieces = uint32_t(images->count());
+        ASSERT_GT(pieces, 6u);
+        reader->reads = 0;
+        uint64_t runs = 0;
+        for (uint32_t piece = 0; piece < pieces; ++runs) {
+            const Request first = Request::imagePiece(piece);
+            const uint32_t count = source.runFrom(first, pieces, true);
+            const auto read = source.readRun(first, count, true);
+            ASSERT_EQ(read.size(), count);
+            for (uint32_t i = 0; i < count; ++i, ++piece) {
+                ASSERT_TRUE(read[i].ok());
+                const auto alone = images->readPiece(*reader, piece);
+                --reader->reads;
+                EXPECT_EQ(read[i]->texels, *alone);
+                EXPECT_GE(source.bytesToRead(Request::imagePiece(piece), true), read[i]->bytes());
+            }
+        }
+        EXPECT_EQ(reader->reads, runs);
+        EXPECT_EQ(runs == pieces, runBytes == 0);
+        EXPECT_EQ(runs == 1, runBytes == uint64_t{1} << 30);
+    }
+    // A wrong tile is an error of its piece alone.
+    {
+        std::fstream file(folder / "images.vcp", std::ios::binary | std::ios::in | std::ios::out);
+        const ImagesPlace& place = dataset->header.images;
+        const auto last = std::streamoff(place.offset + place.bytes - 1);
+        file.seekg(last);
+        const char byte = char(file.get());
+        file.seekp(last);
+        file.put(char(byte ^ 1));
+    }
+    const FilePageSource source(reader, dataset, uint64_t{1} << 30);
+    const auto pieces = uint32_t((*source.images())->count());
+    reader->distrusted = 0;
+    const auto read = source.readRun(Request::imagePiece(0), pieces, true);
+    for (uint32_t i = 0; i < pieces; ++i) EXPECT_EQ(read[i].ok(), i + 1 < pieces) << i;
+    EXPECT_EQ(read.back().error().code, ErrorCode::InvalidInput);
+    EXPECT_GT(reader->distrusted, 0u);
 }
 
 TEST(PageSource, WhatIsKeptIsNotReadAgain) {

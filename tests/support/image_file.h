@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include "octree/image/image_assembly.h"
 #include "octree/image/tile_codec.h"
 #include "octree/io/content_hash.h"
 #include "octree/vcp_writer.h"
@@ -50,6 +51,17 @@ struct StoredImages {
             }
     }
 };
+
+/// Reads the images of a file, piece by piece, with all their levels. Errors: ImagePieces'.
+inline Result<ImageSet> wholeImages(const ByteReader& reader, const ImagesPlace& place) {
+    VCP_TRY_ASSIGN(const auto pieces, ImagePieces::read(reader, place));
+    ImageAssembly assembly(pieces);
+    for (uint64_t piece = 0; piece < pieces->count(); ++piece) {
+        VCP_TRY_ASSIGN(const auto texels, pieces->readPiece(reader, piece));
+        assembly.take(piece, texels);
+    }
+    return assembly.set();
+}
 
 /// Writes a file of one empty page with images.
 inline void writeImageFile(const std::filesystem::path& path, const StoredImages& images) {

@@ -107,7 +107,7 @@ TEST_F(ImageFile, IsReadBack) {
     ASSERT_TRUE(dataset.ok());
     EXPECT_EQ(dataset->header.version, kImagesFileVersion);
     EXPECT_TRUE(dataset->hasImages());
-    const auto set = ImageSet::read(file, dataset->header.images, ~uint64_t{0});
+    const auto set = test::wholeImages(file, dataset->header.images);
     ASSERT_TRUE(set.ok()) << set.error().line();
     ASSERT_EQ(set->images().size(), images_.size());
     for (size_t i = 0; i < images_.size(); ++i) {
@@ -115,7 +115,7 @@ TEST_F(ImageFile, IsReadBack) {
         ASSERT_EQ(image.levels.size(), images_[i].levels.size());
         for (size_t l = 0; l < image.levels.size(); ++l) {
             const auto& texels = images_[i].levels[l];
-            EXPECT_TRUE(std::equal(texels.begin(), texels.end(), set->texelsOf(image.levels[l])));
+            EXPECT_TRUE(std::equal(texels.begin(), texels.end(), image.levels[l].texels.get()));
         }
     }
     ASSERT_EQ(set->materials().size(), 3u);
@@ -124,18 +124,16 @@ TEST_F(ImageFile, IsReadBack) {
     EXPECT_EQ(set->materials()[2].wrapV, ImageWrap::Mirror);
 }
 
-TEST_F(ImageFile, TakesNoMoreMemoryThanItMay) {
-    const TableFile file(bytes_);
+TEST_F(ImageFile, TheLargestLevelsGiveWayWhereMemoryIsShort) {
     // 140 + 35 + 17 + 8 + 4 + 2 + 1 texels, 15 + 2 + 1, and 1.
-    const auto all = ImageSet::read(file, place(), 226 * 4);
-    EXPECT_EQ(all->bytes(), 226u * 4);
-    const auto less = ImageSet::read(file, place(), 226 * 4 - 1);
-    EXPECT_EQ(less->bytes(), 86u * 4);
-    EXPECT_EQ(less->images()[1].finest, 1u) << "the largest gives way";
-    EXPECT_EQ(less->images()[1].width, 70u) << "its coordinates mean the same";
-    EXPECT_TRUE(std::equal(images_[1].levels[1].begin(), images_[1].levels[1].end(),
-                           less->texelsOf(less->images()[1].levels[0])));
-    EXPECT_EQ(ImageSet::read(file, place(), 0)->bytes(), 3u * 4) << "a texel each";
+    const std::span<const ImageRow> images(stored_.tables.images);
+    const std::vector<uint32_t> all{0, 0, 0}, texels{2, 6, 0}, none{3, 7, 1};
+    EXPECT_EQ(finestWithin(images, all, texels, 226 * 4), all);
+    EXPECT_EQ(finestWithin(images, all, texels, 226 * 4 - 1), (std::vector<uint32_t>{0, 1, 0}));
+    EXPECT_EQ(finestWithin(images, all, texels, 0), texels);
+    EXPECT_EQ(finestWithin(images, all, none, 0), none);
+    EXPECT_EQ(finestWithin(images, {3, 0, 1}, texels, 207 * 4), (std::vector<uint32_t>{3, 0, 1})) << "two have none";
+    EXPECT_EQ(finestWithin(images, all, {2, 0, 0}, 0), (std::vector<uint32_t>{2, 0, 0})) << "one must stay";
 }
 
 TEST_F(ImageFile, EveryTruncationIsFound) {
@@ -164,7 +162,7 @@ TEST_F(ImageFile, AWrongTileIsNamed) {
     ASSERT_FALSE(verified.ok());
     EXPECT_NE(verified.error().line().find("tile 0: byte " + std::to_string(first)), std::string::npos)
         << verified.error().line();
-    EXPECT_FALSE(ImageSet::read(file, place(), ~uint64_t{0}).ok());
+    EXPECT_FALSE(test::wholeImages(file, place()).ok());
 }
 
 TEST_F(ImageFile, LiesBehindTheRightHashAreRefused) {

@@ -1,6 +1,7 @@
 // Colours from images: the filter against one in double precision that reads every texel by its definition, and
 // pictures of walls whose colours are known in closed form.
 #include <cmath>
+#include <fstream>
 #include <functional>
 #include <limits>
 
@@ -70,24 +71,25 @@ glm::dvec4 oracle(const LevelledImage& image, ImageWraps wraps, glm::dvec2 at, c
 }
 
 /// The image in a file, read back.
-ImageSet storedSet(const LevelledImage& image, uint64_t mostBytes = ~uint64_t{0}) {
+ImageSet storedSet(const LevelledImage& image) {
     const TestFolder folder("vcp_image_filter");
     test::StoredImages stored;
     stored.add(image);
     stored.tables.materials = {{}};
     test::writeImageFile(folder / "image.vcp", stored);
     const auto file = openFile(folder / "image.vcp");
-    return *ImageSet::read(**file, readDataset(**file)->header.images, mostBytes);
+    return *test::wholeImages(**file, readDataset(**file)->header.images);
 }
 
 TEST(ImageFilter, CoarserLevelsDoWhereMemoryIsScarce) {
     const LevelledImage image = test::randomImage(37, 21, 6);
-    const ImageSet set = storedSet(image, 37 * 21 * 4);
+    ImageSet set = storedSet(image);
+    set.drop(0, 1);
     ASSERT_EQ(set.images()[0].finest, 1u);
     for (int i = 0; i < 50; ++i) {
         const glm::dvec2 at(0.02 * i, 0.7 - 0.01 * i);
         const glm::vec4 found =
-            filteredColour(set, set.images()[0], {}, glm::vec2(at), placesOf(set.images()[0], {{0, 0}, 0.5f, 0.5f}));
+            filteredColour(set.images()[0], {}, glm::vec2(at), placesOf(set.images()[0], {{0, 0}, 0.5f, 0.5f}));
         const glm::dvec4 wanted = oracle(image, {}, at, {{0, 0}, 2, 2});
         for (int c = 0; c < 4; ++c) EXPECT_NEAR(found[c], wanted[c], 2e-3) << i;
     }
@@ -114,7 +116,7 @@ TEST(ImageFilter, IsItsDefinition) {
         single.longAxis = float(footprint.longAxis);
         single.along = glm::vec2(footprint.along);
         const glm::vec4 found =
-            filteredColour(set, set.images()[0], wraps, glm::vec2(at), placesOf(set.images()[0], single));
+            filteredColour(set.images()[0], wraps, glm::vec2(at), placesOf(set.images()[0], single));
         const glm::dvec4 wanted = oracle(image, wraps, at, footprint);
         for (int c = 0; c < 4; ++c) EXPECT_NEAR(found[c], wanted[c], 2e-3) << c;
     }
@@ -135,7 +137,7 @@ TEST(ImageFilter, AnyNumbersAreRead) {
                         footprint.longAxis = std::abs(v);
                         footprint.shortAxis = width;
                         const glm::vec4 found =
-                            filteredColour(set, image, {wrap, (wrap + 1) % 3}, {u, v}, placesOf(image, footprint));
+                            filteredColour(image, {wrap, (wrap + 1) % 3}, {u, v}, placesOf(image, footprint));
                         for (int c = 0; c < 4; ++c) ASSERT_TRUE(found[c] >= 0 && found[c] <= 1.0001f) << found[c];
                     }
 }
@@ -172,16 +174,19 @@ TEST(ImageFilter, FootprintsAreThoseOfThePixel) {
 class ImagePictures : public ::testing::Test {
 protected:
     void build(const test::TexelAt& floor) {
-        const PlacedDataset walls =
-            test::builtWalls(folder_.path(), floor, [](uint32_t, uint32_t) { return 0x808080u; });
-        ASSERT_TRUE(walls.dataset);
+        walls_ = test::builtWalls(folder_.path(), floor, [](uint32_t, uint32_t) { return 0x808080u; });
+        ASSERT_TRUE(walls_.dataset);
+        renderer_ = opened();
+        ASSERT_TRUE(renderer_);
+    }
+    [[nodiscard]] std::unique_ptr<HostRenderer> opened() const {
         RendererOptions shown;
         shown.budgetBytes = uint64_t{64} << 20;
         auto renderer = HostRenderer::create(shown);
-        ASSERT_TRUE(renderer.ok());
-        renderer_ = *std::move(renderer);
-        const auto opened = renderer_->open({walls}, {});
-        ASSERT_TRUE(opened.ok()) << opened.error().line();
+        EXPECT_TRUE(renderer.ok());
+        const auto opened = (*renderer)->open({walls_}, {});
+        EXPECT_TRUE(opened.ok()) << opened.error().line();
+        return *std::move(renderer);
     }
 
     /// Draws a square of the floor, `edge` wide, about `middle`. Compares each pixel with `colour` of where its middle
@@ -214,8 +219,72 @@ protected:
     }
 
     TestFolder folder_{"vcp_image_pictures"};
+    PlacedDataset walls_;
     std::unique_ptr<HostRenderer> renderer_;
 };
+
+/// The floor from above, and the walls, from so far.
+FrameRequest wallsFrom(double distance) {
+    FrameRequest request;
+    request.width = request.height = 96;
+    request.shading.mode = ShadingMode::Unlit;
+    request.camera.forward = glm::normalize(glm::dvec3(-3, -2, -1));
+    request.camera.eye = glm::dvec3(2, 1, 0.5) - distance * request.camera.forward;
+    request.camera.up = {0, 0, 1};
+    request.camera.verticalFov = 0.7;
+    return request;
+}
+
+TEST_F(ImagePictures, LevelsThatNoPixelReadsChangeNothing) {
+    const auto texel = [](uint32_t x, uint32_t y) { return (x * 37 + y * 91) % 256 | ((x ^ y) % 256) << 8; };
+    build(texel);
+    ASSERT_TRUE(renderer_->drawSettled(wallsFrom(0.4)).ok());
+    const uint64_t all = renderer_->update(wallsFrom(0.4))->bytesRead;
+    uint64_t before = 0;
+    for (const double distance : {200.0, 60.0, 25.0, 12.0, 6.0, 3.0}) {
+        const auto fresh = opened();
+        ASSERT_TRUE(fresh->drawSettled(wallsFrom(distance)).ok());
+        ASSERT_TRUE(renderer_->drawSettled(wallsFrom(distance)).ok());
+        EXPECT_EQ(fresh->readPicture()->rgba, renderer_->readPicture()->rgba) << distance;
+        const uint64_t read = fresh->update(wallsFrom(distance))->bytesRead;
+        EXPECT_GE(read, before) << distance;
+        before = read;
+        EXPECT_TRUE(distance < 50 || read < all) << distance;
+    }
+    EXPECT_EQ(renderer_->update(wallsFrom(3))->bytesRead, all) << "what is there is not read again";
+}
+
+TEST_F(ImagePictures, AWrongTileLeavesTheColoursOfVertices) {
+    build([](uint32_t, uint32_t) { return 0x00ff00u; });
+    const FrameRequest request = wallsFrom(6);
+    ASSERT_TRUE(renderer_->drawSettled(request).ok());
+    std::fstream file(folder_.path() / "walls.vcp", std::ios::in | std::ios::out | std::ios::binary);
+    const ImagesPlace& place = walls_.dataset->header.images;
+    const auto lastByte = std::streamoff(place.offset + place.bytes - 1);
+    file.seekg(lastByte);
+    const char last = char(file.get());
+    file.seekp(lastByte);
+    file.put(char(last ^ 1)).flush();
+    const auto renderer = opened();
+    const auto settled = renderer->drawSettled(request);
+    ASSERT_TRUE(settled.ok()) << settled.error().line();
+    ASSERT_EQ(settled->update.problems.size(), 1u);
+    const std::string line = settled->update.problems[0].line();
+    EXPECT_NE(line.find("walls.vcp: tile "), std::string::npos) << line;
+    // The floor is what it was; the wall's vertices are grey, as its image, or tinged by the floor's.
+    const auto shown = renderer->readPicture()->rgba, right = renderer_->readPicture()->rgba;
+    uint64_t floor = 0, grey = 0;
+    for (size_t at = 0; at < right.size(); at += 4) {
+        if (right[at] < 8 && right[at + 1] > 247) {
+            ++floor;
+            EXPECT_TRUE(std::equal(&right[at], &right[at] + 4, &shown[at]));
+        } else if (right[at] == 0x80 && right[at + 1] == 0x80) {
+            grey += shown[at] >= 0x40 && shown[at + 2] >= 0x40 ? 1 : 0;
+        }
+    }
+    EXPECT_GT(floor, 500u);
+    EXPECT_GT(grey, 500u);
+}
 
 TEST_F(ImagePictures, AGradientIsShownAsItIs) {
     build([](uint32_t x, uint32_t y) { return (40 + 2 * x) | (20 + 5 * y) << 8 | 90u << 16; });

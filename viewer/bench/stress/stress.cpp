@@ -52,7 +52,7 @@ public:
     void check(const UpdateResult& update) {
         require(update.residentBytes <= budgetBytes_, "more bytes are resident than the budget allows");
         require(update.heldBytesMax <= ramBytes_, "pages on their way and kept take more memory than --ram allows");
-        require(update.settled == (update.pagesMissing == 0 && !update.awaitsRays), "settled is not what it says");
+        require(!update.settled || (update.pagesMissing == 0 && !update.awaitsRays), "settled is not what it says");
         require(update.reloads == 0, "a page was loaded twice in a still view");
         for (const Error& problem : update.problems) {
             require(reported_.insert(problem.line()).second, "a page that cannot be read was reported twice");
@@ -161,8 +161,8 @@ private:
             note(*update);
             if (each) each(*update);
             if (update->settled) return update;
-            if (update->loads + update->failures != seen) changedAt = Clock::now();
-            seen = update->loads + update->failures;
+            if (update->bytesRead + update->failures != seen) changedAt = Clock::now();
+            seen = update->bytesRead + update->failures;
             invariants_.require(secondsSince(changedAt) < kHopelessSeconds, "a view does not settle");
             if (!report_.violations.empty() && secondsSince(changedAt) >= kHopelessSeconds) return update;
             VCP_TRY(ask("settling", 0));

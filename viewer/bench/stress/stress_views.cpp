@@ -69,7 +69,7 @@ private:
     Result<void> settle(const std::function<bool(const std::string& what, double fraction)>& progress) {
         const auto began = Clock::now();
         auto changedAt = began;
-        uint64_t loads = 0;
+        uint64_t read = 0;
         for (bool settled = false; !settled;) {
             for (size_t view = 0; view < views_.size(); ++view) {
                 VCP_TRY(update(view, path_.size() - 1));
@@ -77,8 +77,8 @@ private:
             }
             settled =
                 std::all_of(last_.begin(), last_.end(), [](const UpdateResult& update) { return update.settled; });
-            if (result_.loads != loads) changedAt = Clock::now();
-            loads = result_.loads;
+            if (last_[0].bytesRead != read) changedAt = Clock::now();
+            read = last_[0].bytesRead;
             require(secondsSince(changedAt) < kHopelessSeconds, "several views: they do not settle");
             if (settled || secondsSince(changedAt) >= kHopelessSeconds) break;
             if (!progress("settling together", 1)) return Error::cancelled();

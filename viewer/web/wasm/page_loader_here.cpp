@@ -8,9 +8,7 @@ namespace vcp {
 
 namespace {
 
-uint64_t sizeOf(const Loaded& loaded) {
-    return loaded.bytes ? loaded.bytes->geometryBytes().size() + loaded.bytes->colourBytes().size() : 0;
-}
+uint64_t sizeOf(const Loaded& loaded) { return loaded.bytes ? loaded.bytes->bytes() : 0; }
 
 }  // namespace
 

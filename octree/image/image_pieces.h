@@ -1,0 +1,66 @@
+// The images of a file in pieces, which are read one at a time: the levels of an image that are a single tile each, or
+// up to kPieceTiles tiles of a finer level, in the order of the file (a square of 512 texels, where there is one).
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "octree/image/image_tables.h"
+
+namespace vcp {
+
+inline constexpr uint64_t kPieceTiles = 64;
+
+struct ImagePiece {
+    uint32_t image = 0;
+    uint32_t level = 0;  ///< the finest one that it has tiles of, 0: the image's finest
+    uint64_t firstTile = 0, tiles = 0;
+    uint64_t texels = 0;  ///< of its tiles
+};
+
+/// Pieces are numbered image by image, coarse levels first. Immutable; any thread.
+class ImagePieces {
+public:
+    /// Reads the tables of a section whose place was checked. Errors: readImageTables'.
+    static Result<std::shared_ptr<const ImagePieces>> read(const ByteReader& reader, const ImagesPlace& place);
+    /// Precondition: the tables were checked.
+    explicit ImagePieces(ImageTables tables);
+
+    [[nodiscard]] const ImageTables& tables() const { return tables_; }
+    [[nodiscard]] uint64_t count() const { return firstPiece_.back(); }
+    [[nodiscard]] ImagePiece piece(uint64_t number) const;
+    /// The levels of an image, the finest first.
+    [[nodiscard]] const std::vector<ImageLevel>& levelsOf(uint32_t image) const { return levels_[image]; }
+    /// Returns the pieces that have a level's tiles: those from `first` on, before `end`.
+    struct Range {
+        uint64_t first = 0, end = 0;
+    };
+    [[nodiscard]] Range piecesOf(uint32_t image, uint32_t level) const;
+    /// Returns the finest level of the image's first piece, which has all that are coarser.
+    [[nodiscard]] uint32_t firstLevel(uint32_t image) const { return firstLevel_[image]; }
+    /// Column and row of a tile in its level.
+    [[nodiscard]] glm::uvec2 placeOf(uint64_t tile) const { return {places_[tile].x, places_[tile].y}; }
+    /// Where a piece is in the file; pieces follow each other.
+    struct Extent {
+        uint64_t begin = 0, end = 0;
+
+        [[nodiscard]] uint64_t bytes() const { return end - begin; }
+    };
+    [[nodiscard]] Extent extentOf(const ImagePiece& piece) const;
+
+    /// Reads and decodes a piece: its tiles, each row by row, RGBA8. Errors: InvalidInput (with file and byte), Io.
+    Result<std::vector<uint32_t>> readPiece(const ByteReader& reader, uint64_t number) const;
+
+private:
+    struct Place {
+        uint16_t x, y;
+    };
+    ImageTables tables_;
+    std::vector<std::vector<ImageLevel>> levels_;
+    std::vector<uint32_t> firstLevel_;
+    std::vector<uint64_t> firstPiece_{0};  // of each image, and the end of the last
+    std::vector<Place> places_;
+};
+
+}  // namespace vcp
