@@ -58,10 +58,13 @@ protected:
                                  header_.vertices, header_.faces));
     }
 
-    Result<void> addVertex(const glm::dvec3& position, Rgba8 colour, uint64_t byte, MeshChunk& chunk) {
+    /// `normal`: of any length, 0 where it is not known.
+    Result<void> addVertex(const glm::dvec3& position, const glm::dvec3& normal, Rgba8 colour, uint64_t byte,
+                           MeshChunk& chunk) {
         if (!std::isfinite(position.x) || !std::isfinite(position.y) || !std::isfinite(position.z))
             return wrong(byte, "the position is not finite (NaN or infinite)");
         chunk.positions.push_back(position);
+        if (header_.hasNormal) chunk.normals.push_back(packDirection(normal));
         if (header_.hasColour) chunk.colours.push_back(colour);
         ++vertex_;
         return {};
@@ -151,7 +154,8 @@ private:
             colour &= ~(0xFFu << (8 * channel));
             colour |= static_cast<Rgba8>(value) << (8 * channel);
         }
-        return addVertex({numbers[0], numbers[1], numbers[2]}, colour, byteAt(line), chunk);
+        const glm::dvec3 normal = count < 6 ? glm::dvec3(0) : glm::dvec3(numbers[3], numbers[4], numbers[5]);
+        return addVertex({numbers[0], numbers[1], numbers[2]}, normal, colour, byteAt(line), chunk);
     }
 
     Result<void> readFace(const char* p, MeshChunk& chunk) {
@@ -205,7 +209,9 @@ private:
                 const float value = std::min(std::max(0.0f, loadReal(rgba + 4 * channel)), 1.0f);
                 colour |= static_cast<Rgba8>(value * 255 + 0.5f) << (8 * channel);
             }
-            VCP_TRY(addVertex({loadReal(p), loadReal(p + 4), loadReal(p + 8)}, colour,
+            const glm::dvec3 normal =
+                header_.hasNormal ? glm::dvec3(loadReal(p + 12), loadReal(p + 16), loadReal(p + 20)) : glm::dvec3(0);
+            VCP_TRY(addVertex({loadReal(p), loadReal(p + 4), loadReal(p + 8)}, normal, colour,
                               source_.offset() + uint64_t(p - bytes.data()), chunk));
         }
         source_.advance(uint64_t(p - bytes.data()));

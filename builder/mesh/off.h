@@ -1,8 +1,9 @@
 // OFF (Geomview's Object File Format), ASCII and binary, as a MeshStream.
 //
 // - The keyword may carry ST (texture coordinates), C (colours) and N (normals): their values follow the position
-//   of each vertex in the order position, normal, colour, texture coordinates. Normals and texture coordinates
-//   are read over. 4OFF and nOFF (other dimensions) are refused.
+//   of each vertex in the order position, normal, colour, texture coordinates. Normals are directions of any length;
+//   those of length 0, or that are not there, are unknown. Texture coordinates are read over. 4OFF and nOFF (other
+//   dimensions) are refused.
 // - ASCII: a vertex is a line, a face is a line; # begins a comment. The count of edges may be missing. Colours
 //   are 0..1 when one of the vertex has a decimal point, else 0..255. The keyword may be missing.
 // - Binary: 32-bit, big endian as Geomview says, or little endian as some write it: the order that makes the

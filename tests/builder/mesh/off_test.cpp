@@ -49,6 +49,14 @@ TEST(Off, VertexColoursAreFractionsOrBytes) {
         readOff("CNOFF\n3 1 0\n0 0 0 0 0 1 1.0 0 0 1\n1 0 0 0 0 1 0 0.5 0 1\n0 1 0 0 0 1 0 0 1 0.0\n3 0 1 2\n");
     ASSERT_FALSE(both.error) << both.line();
     EXPECT_EQ(both.colours, (std::vector<Rgba8>{0xFF0000FF, 0xFF008000, 0x00FF0000}));
+    EXPECT_EQ(both.normals, std::vector<uint32_t>(3, packDirection({0, 0, 1})));
+}
+
+TEST(Off, NormalsAreDirectionsOfAnyLength) {
+    const ReadMesh mesh = readOff("NOFF\n3 1 0\n0 0 0 0 3 0\n1 0 0 0 0 0\n0 1 0\n3 0 1 2\n");
+    ASSERT_FALSE(mesh.error) << mesh.line();
+    EXPECT_EQ(mesh.normals, (std::vector<uint32_t>{packDirection({0, 1, 0}), kUnknownNormal, kUnknownNormal}));
+    EXPECT_TRUE(readOff("OFF\n3 1 0\n0 0 0 0 3 0\n1 0 0\n0 1 0\n3 0 1 2\n").normals.empty());
 }
 
 TEST(Off, FaceColoursAreAWarning) {
@@ -75,8 +83,8 @@ TEST(Off, WhatIsWrongIsNamed) {
 }
 
 // Geomview's layout, in either byte order.
-std::string binaryOff(bool big, bool colours) {
-    std::string bytes = colours ? "COFF BINARY\n" : "OFF BINARY\n";
+std::string binaryOff(bool big, bool colours, bool normals = false) {
+    std::string bytes = std::string(colours ? "C" : "") + (normals ? "N" : "") + "OFF BINARY\n";
     const auto put = [&](uint32_t value) {
         for (int i = 0; i < 4; ++i) bytes += char(value >> (big ? 24 - 8 * i : 8 * i));
     };
@@ -84,6 +92,8 @@ std::string binaryOff(bool big, bool colours) {
     for (const uint32_t count : {4, 2, 0}) put(count);
     for (int v = 0; v < 4; ++v) {
         for (const float x : {float(v), float(v * v), -0.5f}) real(x);
+        for (const float n : {0.0f, 2.0f, float(v)})
+            if (normals) real(n);
         for (const float c : {1.0f, 0.0f, 0.5f, 2.0f})
             if (colours) real(c);
     }
@@ -96,13 +106,16 @@ std::string binaryOff(bool big, bool colours) {
 TEST(Off, ReadsBinaryOfEitherByteOrder) {
     for (const bool big : {false, true})
         for (const bool colours : {false, true}) {
-            const ReadMesh mesh = readOff(binaryOff(big, colours));
+            const ReadMesh mesh = readOff(binaryOff(big, colours, !colours));
             ASSERT_FALSE(mesh.error) << mesh.line();
             EXPECT_EQ(mesh.positions[3], glm::dvec3(3, 9, -0.5));
             EXPECT_EQ(mesh.triangles, (std::vector<Triangle>{{0, 1, 2}, {0, 2, 3}, {3, 2, 1}}));
             EXPECT_EQ(mesh.colours.size(), colours ? 4u : 0u);
             if (colours) {
                 EXPECT_EQ(mesh.colours[0], 0xFF8000FFu);
+            } else {
+                EXPECT_EQ(mesh.normals[0], packDirection({0, 1, 0}));
+                EXPECT_EQ(mesh.normals[3], packDirection({0, 2, 3}));
             }
         }
 }
