@@ -22,7 +22,10 @@ public:
         static const ColourTables tables;
         return tables;
     }
-    [[nodiscard]] float lightOf(uint32_t byte) const { return lightOfByte_[byte]; }
+    /// The light of a texel's red, green and blue.
+    [[nodiscard]] glm::vec3 lightOf(uint32_t texel) const {
+        return {lightOfByte_[texel & 255u], lightOfByte_[texel >> 8 & 255u], lightOfByte_[texel >> 16 & 255u]};
+    }
     /// linearToSrgb of 0 to 1, to within 10^-4.
     [[nodiscard]] float storedOf(float light) const {
         const float at = std::sqrt(std::clamp(light, 0.0f, 1.0f)) * kRoots;
@@ -51,17 +54,15 @@ void add(const ColourTables& tables, glm::vec4& sum, const uint32_t (&texels)[4]
     // Most texels hide all that is behind them.
     if ((texels[0] & texels[1] & texels[2] & texels[3]) >> 24 != 255)
         for (int i = 0; i < 4; ++i) share[i] *= float(texels[i] >> 24) / 255;
-    for (int channel = 0; channel < 3; ++channel)
-        sum[channel] += (share[0] * tables.lightOf(texels[0] >> 8 * channel & 255u) +
-                         share[1] * tables.lightOf(texels[1] >> 8 * channel & 255u)) +
-                        (share[2] * tables.lightOf(texels[2] >> 8 * channel & 255u) +
-                         share[3] * tables.lightOf(texels[3] >> 8 * channel & 255u));
-    sum.w += (share[0] + share[1]) + (share[2] + share[3]);
+    const glm::vec3 light = (share[0] * tables.lightOf(texels[0]) + share[1] * tables.lightOf(texels[1])) +
+                            (share[2] * tables.lightOf(texels[2]) + share[3] * tables.lightOf(texels[3]));
+    sum += glm::vec4(light, (share[0] + share[1]) + (share[2] + share[3]));
 }
 
 /// Returns the texels that are shown at a place of a row and after it.
-glm::ivec2 pairOf(int at, int size, uint32_t wrap) {
-    if (at >= 0 && at + 1 < size) return {at, at + 1};
+inline glm::ivec2 pairOf(int at, int size, uint32_t wrap) {
+    if (at >= 0 && at + 1 < size) [[likely]]
+        return {at, at + 1};
     return {f32::wrappedTexel(at, size, wrap), f32::wrappedTexel(at + 1, size, wrap)};
 }
 
@@ -72,14 +73,14 @@ int wholeBelow(float x) {
 }
 
 /// Adds what a level shows at a point, between four texels.
-void addBilinear(glm::vec4& sum, const ImageSet::Level& level, ImageWraps wraps, glm::vec2 at, float weight) {
+void addBilinear(const ColourTables& tables, glm::vec4& sum, const ImageSet::Level& level, ImageWraps wraps,
+                 glm::vec2 at, float weight) {
     const int width = int(level.width), height = int(level.height);
     const float x = f32::boundedPlace(at.x * float(width) - 0.5f), y = f32::boundedPlace(at.y * float(height) - 0.5f);
     const int column = wholeBelow(x), row = wholeBelow(y);
     const float fx = x - float(column), fy = y - float(row);
     const glm::ivec2 columns = pairOf(column, width, wraps.u), rows = pairOf(row, height, wraps.v);
     const uint32_t* const texels = level.texels.get();
-    const ColourTables& tables = ColourTables::get();
     const uint32_t* const upper = texels + size_t(rows[0]) * size_t(width);
     const uint32_t* const lower = texels + size_t(rows[1]) * size_t(width);
     add(tables, sum, {upper[columns[0]], upper[columns[1]], lower[columns[0]], lower[columns[1]]},
@@ -89,16 +90,16 @@ void addBilinear(glm::vec4& sum, const ImageSet::Level& level, ImageWraps wraps,
 }  // namespace
 
 glm::vec4 filteredColour(const ImageSet::Image& image, ImageWraps wraps, glm::vec2 at, const ImagePlaces& places) {
+    const ColourTables& tables = ColourTables::get();
     const float part = 1 / float(places.count);
     glm::vec4 sum(0);
     for (int i = 0; i < places.count; ++i) {
         const glm::vec2 place = at + ((float(i) + 0.5f) * part - 0.5f) * places.along;
-        addBilinear(sum, image.levels[size_t(places.finer)], wraps, place, (1 - places.coarser) * part);
+        addBilinear(tables, sum, image.levels[size_t(places.finer)], wraps, place, (1 - places.coarser) * part);
         if (places.coarser > 0)
-            addBilinear(sum, image.levels[size_t(places.finer) + 1], wraps, place, places.coarser * part);
+            addBilinear(tables, sum, image.levels[size_t(places.finer) + 1], wraps, place, places.coarser * part);
     }
     if (!(sum.w > 0)) return glm::vec4(0);
-    const ColourTables& tables = ColourTables::get();
     const float scale = 1 / sum.w;
     return {tables.storedOf(sum.x * scale), tables.storedOf(sum.y * scale), tables.storedOf(sum.z * scale), sum.w};
 }

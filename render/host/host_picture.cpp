@@ -89,7 +89,7 @@ private:
         const float shown = frame_.shadingMode == frame::kShadeLevel
                                 ? float(layer_.scene.levelOf(page)) / std::max(float(frame_.finestLevel), 1.0f)
                                 : page.error / std::max(edge, 1e-30f);
-        return glm::packUnorm4x8(glm::vec4(f32::heat(shown), 1));
+        return packedColour(glm::vec4(f32::heat(shown), 1));
     }
 
     /// Returns where rays of light begin.
@@ -240,7 +240,7 @@ std::vector<uint32_t> SampledLight::mean() const {
     std::vector<uint32_t> colours(sums_.size());
     std::ranges::transform(sums_, colours.begin(), [this](const glm::vec4& sum) {
         const glm::vec3 light = glm::vec3(sum) / std::max(sum.w, 1.0f);
-        return glm::packUnorm4x8(glm::vec4(f32::colourOfLight(light), sum.w / float(samples_)));
+        return packedColour(glm::vec4(f32::colourOfLight(light), sum.w / float(samples_)));
     });
     return colours;
 }

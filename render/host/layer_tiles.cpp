@@ -133,7 +133,7 @@ void LayerTiles::findAlbedo(const TileHits& hits, TileSurface& surface) const {
 }
 
 uint32_t LayerTiles::colourOf(HitColours& colours, const TileHits& hits, glm::ivec2 pixel, int i) const {
-    return glm::packUnorm4x8(colours.at(i, [&] {
+    return packedColour(colours.at(i, [&] {
         return HitColours::PixelView{glm::vec3(rayOf(pixel).direction), pixelEdgeAt(depthInCells(hits.depth[i]))};
     }));
 }

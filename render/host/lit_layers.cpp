@@ -8,9 +8,9 @@
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
-#include <glm/packing.hpp>
 
 #include "render/host/hit_light.h"
+#include "render/host/hit_surface.h"
 #include "render/host/layer_tiles.h"
 
 namespace vcp {
@@ -282,7 +282,7 @@ private:
         for (uint32_t i = 0; i < frame_.lightCount; ++i)
             if ((planes_.sun[pixel] & bitsOfLight(frame_, i)) != 0)
                 sun += frame::kMesoSun * lightNumbered(frame_, i).w * far.light[int(i)];
-        return glm::packUnorm4x8(glm::vec4(planes_.albedo[pixel] * f32::lightUnderSky(far.sky, sun, skySeen), 1));
+        return packedColour(glm::vec4(planes_.albedo[pixel] * f32::lightUnderSky(far.sky, sun, skySeen), 1));
     }
 
     HostPicture& picture_;

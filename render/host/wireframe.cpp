@@ -6,6 +6,8 @@
 #include <glm/geometric.hpp>
 #include <glm/packing.hpp>
 
+#include "render/host/hit_surface.h"
+
 namespace vcp {
 
 namespace {
@@ -41,7 +43,7 @@ HitLine lineAt(const HostScene& scene, const TileHits& hits, int pixel, glm::vec
 
 uint32_t withLine(uint32_t colour, const HitLine& line) {
     const glm::vec3 ink = line.isTriangles ? f32::triangleInk() : f32::leafInk();
-    return glm::packUnorm4x8(glm::vec4(glm::mix(glm::vec3(glm::unpackUnorm4x8(colour)), ink, line.part), 1));
+    return packedColour(glm::vec4(glm::mix(glm::vec3(glm::unpackUnorm4x8(colour)), ink, line.part), 1));
 }
 
 }  // namespace vcp
