@@ -143,7 +143,7 @@ Result<SceneResidency::Update> SceneResidency::update(std::span<const std::optio
     }
     VCP_TRY(pool_->flush());
     PolicyOutcome outcome = policy_->finish(number);
-    std::ranges::move(imageWishes(views, outcome.cuts, number), std::back_inserter(outcome.wishes));
+    for (const Wish& wish : imageWishes(views, outcome.cuts, number)) outcome.wishes.push_back(wish);
     loader_->request(std::move(outcome.wishes), uploadBytes());
     for (size_t i = 0; i < datasets_.size(); ++i)
         listens_[i] = outcome.missing[i] > 0 && options_.order == LoadOrder::Feedback;
