@@ -6,6 +6,7 @@
 
 #include <glm/geometric.hpp>
 
+#include "octree/page/page_triangles.h"
 #include "octree/surface/image_lookup.h"
 
 namespace vcp {
@@ -16,11 +17,7 @@ namespace {
 /// times this. That is the length of the shorter axis, or the part of the longer one that is read at a time. Infinite
 /// where rays cannot hit it, or find no footprint: there the coarsest level is read.
 float texelsPerCell(const PageView& page, const Index3& corners, glm::vec2 size) {
-    glm::vec3 p[3];
-    for (size_t i = 0; i < 3; ++i) {
-        const glm::u32vec2 vertex = page.vertices[corners[i]];
-        p[i] = f32::decodeVertex(vertex.x, vertex.y);
-    }
+    const auto p = cornersOf(page, corners);
     const TexturePoint &a = page.points[corners[0]], &b = page.points[corners[1]], &c = page.points[corners[2]];
     const auto from = [&](const TexturePoint& to) {
         return glm::vec2(float(int64_t{to.u} - a.u), float(int64_t{to.v} - a.v)) * float(kTextureUnit);
@@ -42,7 +39,7 @@ std::vector<ImageNeed> imageNeeds(const ImageTables& tables, const PageView& pag
     std::vector<ImageNeed> needs;
     if (page.points.empty()) return needs;
     std::vector<int64_t> placeOf;  // in `needs`, by image
-    const auto triangle = [&](const Index3& corners) {
+    forEachTriangle(page, [&](const Index3& corners) {
         const uint32_t material = page.points[corners[0]].material;
         if (material == 0 || material > tables.materials.size()) return;
         const uint32_t image = tables.materials[material - 1].image;
@@ -55,12 +52,7 @@ std::vector<ImageNeed> imageNeeds(const ImageTables& tables, const PageView& pag
         }
         float& least = needs[size_t(placeOf[image])].texelsPerCell;
         least = std::min(least, texels);
-    };
-    const auto visit = [&](uint32_t word) {
-        if (nodeType(word) == kNodeHard) forEachTriangle(page.strips, word, triangle);
-    };
-    visit(page.header.root);
-    for (const uint32_t word : page.nodes) visit(word);
+    });
     return needs;
 }
 

@@ -90,7 +90,7 @@ void tell(std::span<const PlacedLayer> placed, std::span<const HostLayer> layers
             seen.push_back({&residency,
                             {layer.cut->marked(layer.marks->byCamera), layer.cut->marked(layer.marks->byLight)},
                             selectionView(layer.seen),
-                            residency.cutNumber(view)});
+                            residency.pagesNumber(view)});
         if (residency.listens())
             residency.hear(feedbackOf(layers[i], residency.dataset(), picture, {0, 0, picture.size.y, picture.size.y}),
                            selectionView(layer.seen));

@@ -185,7 +185,7 @@ void seeAll(std::vector<SeenPages> seen, ViewNumber number) {
                                      [](const SeenPages& each) { return each.residency->hasAll(each.hit.byCamera); });
     for (SeenPages& each : seen) {
         if (!isFinal) each.hit.byLight.clear();
-        each.residency->see(each.hit, each.view, each.cutNumber, number);
+        each.residency->see(each.hit, each.view, each.pagesNumber, number);
     }
 }
 

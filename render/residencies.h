@@ -86,7 +86,7 @@ struct SeenPages {
     Residency* residency;
     PagesHit hit;
     SelectionView view;
-    uint64_t cutNumber;
+    uint64_t pagesNumber;  ///< of what was drawn (Residency::pagesNumber)
 };
 
 /// Tells residencies which pages the rays of one frame hit. Rays of light begin where the camera's rays hit, whatever

@@ -180,7 +180,7 @@ uint64_t FilePageSource::bytesToRead(Request request, bool withColour) const {
     if (request.kind == Request::Kind::ImagePiece) {
         const auto images = knownImages();
         const ImagePiece piece = images->piece(request.number);
-        return 2 * images->extentOf(piece).bytes() + piece.texels * sizeof(uint32_t);
+        return 2 * images->extentOf(piece).bytes() + images->texelsOf(piece) * sizeof(uint32_t);
     }
     const PageEntry& entry = dataset_->pages[request.number];
     const uint64_t geometry = 2 * uint64_t{entry.storedBytes} + entry.pageBytes;

@@ -50,7 +50,6 @@ ImagePiece ImagePieces::piece(uint64_t number) const {
     if (before == 0) {
         piece.firstTile = levels.back().firstTile;
         piece.tiles = levels.size() - piece.level;
-        for (size_t level = piece.level; level < levels.size(); ++level) piece.texels += levels[level].texels();
         return piece;
     }
     --before;
@@ -58,11 +57,21 @@ ImagePiece ImagePieces::piece(uint64_t number) const {
     const ImageLevel& level = levels[piece.level];
     piece.firstTile = level.firstTile + before * kPieceTiles;
     piece.tiles = std::min(kPieceTiles, level.tiles() - before * kPieceTiles);
-    for (uint64_t tile = piece.firstTile; tile < piece.firstTile + piece.tiles; ++tile) {
-        const glm::uvec2 size = level.sizeOf(placeOf(tile));
-        piece.texels += uint64_t{size.x} * size.y;
-    }
     return piece;
+}
+
+/// Returns the size of tile `i` of a piece. The first piece of an image has a level a tile, the coarsest first.
+glm::uvec2 ImagePieces::sizeOf(const ImagePiece& piece, uint64_t i) const {
+    const std::vector<ImageLevel>& levels = levels_[piece.image];
+    const bool isFirst = piece.level == firstLevel_[piece.image];
+    const ImageLevel& level = isFirst ? levels[levels.size() - 1 - i] : levels[piece.level];
+    return level.sizeOf(placeOf(piece.firstTile + i));
+}
+
+uint64_t ImagePieces::texelsOf(const ImagePiece& piece) const {
+    uint64_t texels = 0;
+    for (uint64_t i = 0; i < piece.tiles; ++i) texels += uint64_t{sizeOf(piece, i).x} * sizeOf(piece, i).y;
+    return texels;
 }
 
 ImagePieces::Extent ImagePieces::extentOf(const ImagePiece& piece) const {
@@ -73,19 +82,13 @@ ImagePieces::Extent ImagePieces::extentOf(const ImagePiece& piece) const {
 Result<std::vector<uint32_t>> ImagePieces::readPiece(const ByteReader& reader, uint64_t number) const {
     const ImagePiece piece = this->piece(number);
     VCP_TRY_ASSIGN(const auto stored, readTiles(reader, tables_, piece.firstTile, piece.tiles));
-    const std::vector<ImageLevel>& levels = levels_[piece.image];
-    std::vector<uint32_t> texels(piece.texels);
+    std::vector<uint32_t> texels(texelsOf(piece));
     std::span<uint32_t> rest(texels);
-    size_t level = piece.level;
-    // The first piece begins with the coarsest level and goes on with a level a tile.
-    const bool isFirst = piece.level == firstLevel_[piece.image];
-    if (isFirst) level = levels.size() - 1;
-    for (uint64_t tile = piece.firstTile; tile < piece.firstTile + piece.tiles; ++tile) {
-        const glm::uvec2 size = levels[level].sizeOf(placeOf(tile));
+    for (uint64_t i = 0; i < piece.tiles; ++i) {
+        const glm::uvec2 size = sizeOf(piece, i);
         const size_t count = size_t{size.x} * size.y;
-        VCP_TRY(decodeTile(reader.name(), tables_, stored, tile, size, rest.first(count)));
+        VCP_TRY(decodeTile(reader.name(), tables_, stored, piece.firstTile + i, size, rest.first(count)));
         rest = rest.subspan(count);
-        if (isFirst) --level;
     }
     return texels;
 }

@@ -16,7 +16,6 @@ struct ImagePiece {
     uint32_t image = 0;
     uint32_t level = 0;  ///< the finest one that it has tiles of, 0: the image's finest
     uint64_t firstTile = 0, tiles = 0;
-    uint64_t texels = 0;  ///< of its tiles
 };
 
 /// Pieces are numbered image by image, coarse levels first. Immutable; any thread.
@@ -41,6 +40,8 @@ public:
     [[nodiscard]] uint32_t firstLevel(uint32_t image) const { return firstLevel_[image]; }
     /// Column and row of a tile in its level.
     [[nodiscard]] glm::uvec2 placeOf(uint64_t tile) const { return {places_[tile].x, places_[tile].y}; }
+    /// Returns the texels of its tiles.
+    [[nodiscard]] uint64_t texelsOf(const ImagePiece& piece) const;
     /// Where a piece is in the file; pieces follow each other.
     struct Extent {
         uint64_t begin = 0, end = 0;
@@ -53,6 +54,8 @@ public:
     Result<std::vector<uint32_t>> readPiece(const ByteReader& reader, uint64_t number) const;
 
 private:
+    [[nodiscard]] glm::uvec2 sizeOf(const ImagePiece& piece, uint64_t i) const;
+
     struct Place {
         uint16_t x, y;
     };

@@ -13,6 +13,7 @@
 #include <glm/vec3.hpp>
 
 #include "octree/page/codec_page.h"
+#include "octree/page/page_triangles.h"
 #include "octree/page/range_coder.h"
 #include "octree/surface/packing.h"
 #include "octree/surface/position_map.h"
@@ -32,12 +33,7 @@ public:
     /// Returns false where there is no such page: vertices of a triangle have different materials, or no triangle has
     /// them.
     bool run() {
-        const auto visit = [&](uint32_t word) {
-            if (nodeType(word) == kNodeHard)
-                forEachTriangle(page_.strips, word, [&](const Index3& triangle) { codeTriangle(triangle); });
-        };
-        visit(page_.header.root);
-        for (const uint32_t word : page_.nodes) visit(word);
+        forEachTriangle(page_, [&](const Index3& triangle) { codeTriangle(triangle); });
         return !wrong_ && used_ == points_.size();
     }
 

@@ -5,6 +5,8 @@
 
 #include <glm/geometric.hpp>
 
+#include "octree/page/page_triangles.h"
+
 namespace vcp {
 
 std::optional<HitColours::Textured> HitColours::find(const HitLeaf& leaf) const {
@@ -12,11 +14,7 @@ std::optional<HitColours::Textured> HitColours::find(const HitLeaf& leaf) const 
     const PageView& view = *scene_.page(leaf.page).view;
     const auto triangle = imagedTriangle(*scene_.images(), view, leaf.corners);
     if (!triangle) return {};
-    glm::vec3 p[3];
-    for (size_t i = 0; i < 3; ++i) {
-        const glm::u32vec2 vertex = view.vertices[leaf.corners[i]];
-        p[i] = f32::decodeVertex(vertex.x, vertex.y);
-    }
+    const auto p = cornersOf(view, leaf.corners);
     const glm::vec3 n = glm::cross(p[1] - p[0], p[2] - p[0]);
     return Textured{.triangle = *triangle,
                     .slope = f32::textureSlope(p[0], p[1], p[2], triangle->toB, triangle->toC),

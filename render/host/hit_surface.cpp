@@ -3,6 +3,8 @@
 #include <glm/geometric.hpp>
 #include <glm/packing.hpp>
 
+#include "octree/page/page_triangles.h"
+
 namespace vcp {
 
 namespace {
@@ -27,11 +29,7 @@ glm::vec3 softNormal(const PageView& view, uint32_t node, glm::vec3 at, float si
 }
 
 glm::vec3 triangleNormal(const PageView& view, const Index3& corners, glm::vec3 weights, glm::vec3 direction) {
-    glm::vec3 p[3];
-    for (int i = 0; i < 3; ++i) {
-        const glm::u32vec2 vertex = view.vertices[corners[size_t(i)]];
-        p[i] = f32::decodeVertex(vertex.x, vertex.y);
-    }
+    const auto p = cornersOf(view, corners);
     glm::vec3 flat = glm::cross(p[1] - p[0], p[2] - p[0]);
     flat *= glm::inversesqrt(std::max(glm::dot(flat, flat), 1e-30f));
     flat = f32::turnedTo(flat, -direction);

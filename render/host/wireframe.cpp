@@ -6,6 +6,7 @@
 #include <glm/geometric.hpp>
 #include <glm/packing.hpp>
 
+#include "octree/page/page_triangles.h"
 #include "render/host/hit_surface.h"
 
 namespace vcp {
@@ -30,11 +31,7 @@ HitLine lineAt(const HostScene& scene, const TileHits& hits, int pixel, glm::vec
         const float edge = std::ldexp(1.0f, int(leaf.bits) - int(kMaxSubcellDepth));
         return {f32::linesOfLeaf(at, normalOf(*page.view, leaf, hits, pixel), direction, pixelEdge / edge), false};
     }
-    glm::vec3 corners[3];
-    for (size_t i = 0; i < 3; ++i) {
-        const glm::u32vec2 vertex = page.view->vertices[leaf.corners[i]];
-        corners[i] = f32::decodeVertex(vertex.x, vertex.y);
-    }
+    const auto corners = cornersOf(*page.view, leaf.corners);
     const float cell = float(1u << page.cellBits);
     return {f32::linesOfTriangle(corners[0], corners[1], corners[2], {1 - at.x - at.y, at.x, at.y}, direction,
                                  pixelEdge / cell),

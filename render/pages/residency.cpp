@@ -15,14 +15,9 @@ Residency::ViewCut& Residency::current(ViewNumber number) {
 }
 
 void Residency::take(DrawableCut drawable, ViewCut& cut) {
-    if (cut.number == 0 || drawable.cut != cut.pages || drawable.partial != cut.partial) {
-        cut.number = cut.pagesNumber = ++cutsDrawn_;
-    } else if (cut.imagesVersion != imagesVersion()) {
-        // Rays hit the same pages, whatever colours these have.
-        const bool isAnswered = cut.answered == cut.number;
-        cut.number = ++cutsDrawn_;
-        if (isAnswered) cut.answered = cut.number;
-    }
+    const bool hasOtherPages = cut.number == 0 || drawable.cut != cut.pages || drawable.partial != cut.partial;
+    if (hasOtherPages || cut.imagesVersion != imagesVersion()) cut.number = ++cutsDrawn_;
+    if (hasOtherPages) cut.pagesNumber = cut.number;
     cut.imagesVersion = imagesVersion();
     cut.pages = std::move(drawable.cut);
     cut.partial = std::move(drawable.partial);
@@ -44,7 +39,7 @@ UpdateResult Residency::cutOf(const SelectionView& view, const DrawableCut& draw
 
 UpdateResult Residency::report(const DrawableCut& drawable, const ViewCut& drawn) const {
     UpdateResult result;
-    result.awaitsRays = drawable.complete && drawn.pagesUnseen > 0 && drawn.answered != drawn.number;
+    result.awaitsRays = drawable.complete && drawn.pagesUnseen > 0 && drawn.answered != drawn.pagesNumber;
     result.settled = drawable.complete && !result.awaitsRays;
     const std::vector<uint64_t>& cut = drawable.cut;
     result.drawable = !cut.empty();
@@ -73,10 +68,10 @@ void Residency::hear(const RayFeedback& feedback, const SelectionView& view) {
     scene_.policy_->hear(feedback, view, number_);
 }
 
-void Residency::see(const PagesHit& hit, const SelectionView& view, uint64_t cutNumber, ViewNumber number) {
+void Residency::see(const PagesHit& hit, const SelectionView& view, uint64_t pagesNumber, ViewNumber number) {
     scene_.policy_->see(hit, view, number, number_);
     if (const auto cut = cuts_.find(number); cut != cuts_.end() && cut->second.view == view)
-        cut->second.answered = cutNumber;
+        cut->second.answered = pagesNumber;
 }
 
 void Residency::surroundWith(uint64_t others, ViewNumber number) {

@@ -39,16 +39,16 @@ public:
 
     /// A number of what the view draws: frames of one cut, with the same levels of images, have the same.
     [[nodiscard]] uint64_t cutNumber(ViewNumber number = 0) { return current(number).number; }
-    /// The same of the pages alone.
+    /// The same of the pages alone: rays hit the same ones, whatever their colours.
     [[nodiscard]] uint64_t pagesNumber(ViewNumber number = 0) { return current(number).pagesNumber; }
     /// Whether the view's next frame is to say which pages its rays hit: some that could be refined are in the cut, and
     /// no frame of it has said so yet.
     [[nodiscard]] bool asksRays(ViewNumber number = 0) {
         const ViewCut& cut = current(number);
-        return cut.pagesUnseen > 0 && cut.answered != cut.number;
+        return cut.pagesUnseen > 0 && cut.answered != cut.pagesNumber;
     }
-    /// Takes in which pages a frame of `view` hit that drew the cut of that number.
-    void see(const PagesHit& hit, const SelectionView& view, uint64_t cutNumber, ViewNumber number = 0);
+    /// Takes in which pages a frame of `view` hit that drew the pages of that number.
+    void see(const PagesHit& hit, const SelectionView& view, uint64_t pagesNumber, ViewNumber number = 0);
     /// Says what else throws rays of light in the view: any number that differs when that does. The next frame is then
     /// to say anew which pages its rays hit.
     void surroundWith(uint64_t others, ViewNumber number = 0);
@@ -89,7 +89,7 @@ private:
         uint64_t imagesVersion = 0;
         uint64_t pagesNumber = 0;           // of its pages, whatever the images
         uint64_t number = 0, reported = 0;  // of the cut, and of that of its last update
-        uint64_t answered = 0;              // of the cut of which a frame of this view said what its rays hit
+        uint64_t answered = 0;              // number of the pages of which a frame of this view said which its rays hit
         uint64_t others = 0;                // as surroundWith() said
         uint64_t pagesUnseen = 0;
         SelectionView view;

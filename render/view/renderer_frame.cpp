@@ -75,7 +75,7 @@ Result<void> Renderer::View::prepare(Frame& frame, size_t i) {
     drawing.request = layer.drawable(frame.request);
     drawing.listened = layer.listens() && !frame.part;
     drawing.asked = layer.asksRays(number) && !frame.part;
-    drawing.cutNumber = layer.residency != nullptr ? layer.residency->cutNumber(number) : 0;
+    drawing.pagesNumber = layer.residency != nullptr ? layer.residency->pagesNumber(number) : 0;
     drawing.others = layer.residency != nullptr ? layer.residency->others(number) : 0;
     drawing.constants = constantsFor(layer, drawing.request);
     const FrameRequest& request = drawing.request;
@@ -593,7 +593,7 @@ void Renderer::View::hear(const Frame& frame) {
         Residency& residency = *layers[i].residency;
         const bool isOfNow = layer.others == residency.others(number);
         seen.push_back(
-            {&residency, layer.feedback.pagesHit(), selectionView(layer.request), isOfNow ? layer.cutNumber : 0});
+            {&residency, layer.feedback.pagesHit(), selectionView(layer.request), isOfNow ? layer.pagesNumber : 0});
     }
     seeAll(std::move(seen), number);
     if (std::any_of(frame.layers.begin(), frame.layers.end(), [](const LayerFrame& layer) { return layer.listened; }))

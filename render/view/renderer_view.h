@@ -87,7 +87,7 @@ struct Renderer::View {
         uint64_t tableNumber = 0;  // of the table that the resources have
         bool listened = false;     // the frame has a feedback pass
         bool asked = false;        // its rays say which pages they hit
-        uint64_t cutNumber = 0;    // of what is drawn (Residency::cutNumber)
+        uint64_t pagesNumber = 0;  // of what is drawn (Residency::pagesNumber)
         uint64_t others = 0;       // what is drawn beside it (Residency::others)
 
         [[nodiscard]] bool reports() const { return listened || asked; }

@@ -55,7 +55,7 @@ TEST_F(Pieces, EachTileIsInOne) {
         const ImagePiece piece = pieces_->piece(number);
         EXPECT_EQ(piece.firstTile, tile);
         EXPECT_LE(piece.tiles, kPieceTiles);
-        EXPECT_EQ(piece.texels, pieces_->readPiece(*file_, number)->size());
+        EXPECT_EQ(pieces_->texelsOf(piece), pieces_->readPiece(*file_, number)->size());
         const auto [first, end] = pieces_->piecesOf(piece.image, piece.level);
         EXPECT_TRUE(first <= number && number < end);
         tile += piece.tiles;

@@ -49,7 +49,7 @@ protected:
                                                  [](const Wish& a, const Wish& b) { return a.priority < b.priority; });
             EXPECT_EQ(urgent->request.kind, Request::Kind::ImagePiece);
             const uint64_t piece = urgent->request.number;
-            images.take(piece, std::vector<uint32_t>(pieces_->piece(piece).texels, uint32_t(piece)));
+            images.take(piece, std::vector<uint32_t>(pieces_->texelsOf(pieces_->piece(piece)), uint32_t(piece)));
             EXPECT_LE(images.shown()->bytes(), images.mostBytes());
             ++delivered;
         }

@@ -195,7 +195,7 @@ EXPORT(vcp_numbers) const double* vcp_numbers() { return opened.numbers; }
 /// bands, 0 where the cut is not the picture's any more. vcp_numbers() are then: rows of a band, error in pixels,
 /// whether rays are asked which pages they hit, and where.
 EXPORT(vcp_begin_sample) int vcp_begin_sample(int sample) {
-    const uint64_t cut = residency().cutNumber();
+    const uint64_t cut = residency().pagesNumber();
     if (sample > 0 && cut != opened.cut) return 0;
     opened.cut = cut;
     BandFrame frame{opened.request, opened.errorPixels, sample == 0 && residency().asksRays(),
