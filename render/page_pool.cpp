@@ -100,12 +100,10 @@ Result<void> PagePool::write(PoolSlot slot, uint64_t at, std::span<const std::by
         std::memcpy(mapped + to, bytes.data(), bytes.size());
         return {};
     }
-    // Copies of one submission have no order among each other.
-    if (stagedBytes_ + bytes.size() > stagings_[filling_].buffer.bytes() || overlapsWaiting(chunk, to, bytes.size()))
-        VCP_TRY(flush());
+    if (stagedBytes_ + bytes.size() > stagings_[filling_].buffer.bytes()) VCP_TRY(flush());
     if (stagedBytes_ == 0) VCP_TRY(reserveStaging(std::max<uint64_t>(bytes.size(), kStagingBytes)));
     std::memcpy(stagings_[filling_].buffer.mapped() + stagedBytes_, bytes.data(), bytes.size());
-    waiting_.push_back({chunk, {stagedBytes_, to, bytes.size()}});
+    waiting_.push_back({chunk, {stagedBytes_, to, bytes.size()}, false, overlapsWaiting(chunk, to, bytes.size())});
     stagedBytes_ += bytes.size();
     return {};
 }
@@ -116,11 +114,14 @@ Result<void> PagePool::flush() {
     const std::vector<StagedCopy> copies = std::exchange(waiting_, {});
     Staging& filled = stagings_[std::exchange(filling_, 1 - filling_)];
     VCP_TRY_ASSIGN(filled.copies, device_.submitCopies([&](VkCommandBuffer commands) {
-        for (const StagedCopy& copy : copies)
-            if (copy.isMove)
+        for (const StagedCopy& copy : copies) {
+            if (copy.isMove) {
                 recordMove(commands, copy);
-            else
-                vkCmdCopyBuffer(commands, filled.buffer.handle(), chunks_[copy.chunk].buffer.handle(), 1, &copy.region);
+                continue;
+            }
+            if (copy.isOrdered) keepOrder(commands);
+            vkCmdCopyBuffer(commands, filled.buffer.handle(), chunks_[copy.chunk].buffer.handle(), 1, &copy.region);
+        }
     }));
     return {};
 }

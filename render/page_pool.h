@@ -44,6 +44,7 @@ private:
         uint64_t chunk = 0;
         VkBufferCopy region{};
         bool isMove = false;
+        bool isOrdered = false;  // it writes what a copy before it writes
     };
     /// What an update brings lies here until its copies have ended, while the next update fills the other one.
     struct Staging {

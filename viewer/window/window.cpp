@@ -1,5 +1,6 @@
 #include "viewer/window/window.h"
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <future>
@@ -25,7 +26,8 @@ namespace {
 constexpr double kDoubleClickSeconds = 0.4;
 // An answer of the desktop that takes longer than the device's start comes later.
 constexpr std::chrono::milliseconds kThemeAwaited{200};
-constexpr double kClickPixels = 4;  // a press that moves less is a click
+constexpr double kAnswerAwaited = 0.05;  // in seconds; see wait()
+constexpr double kClickPixels = 4;       // a press that moves less is a click
 
 Error displayError(const std::string& what) {
     const char* why = nullptr;
@@ -94,15 +96,6 @@ private:
     GLFWwindow* window_ = nullptr;
 };
 
-/// Asks the desktop whether windows are dark; the answer wakes the window.
-std::future<std::optional<bool>> questionToDesktop() {
-    return std::async(std::launch::async, [] {
-        const auto isDark = askDesktop();
-        glfwPostEmptyEvent();
-        return isDark;
-    });
-}
-
 template <class Value>
 bool isReady(const std::future<Value>& future, std::chrono::milliseconds most = {}) {
     return future.wait_for(most) == std::future_status::ready;
@@ -135,7 +128,8 @@ public:
         glfwSetWindowFocusCallback(window_, [](GLFWwindow* w, int hasFocus) {
             of(w).letGo();
             // The desktop's settings may have changed meanwhile.
-            if (hasFocus == GLFW_TRUE && !of(w).desktop_.valid()) of(w).desktop_ = questionToDesktop();
+            if (hasFocus == GLFW_TRUE && !of(w).desktop_.valid())
+                of(w).desktop_ = std::async(std::launch::async, askDesktop);
         });
         glfwSetDropCallback(window_, [](GLFWwindow* w, int count, const char** paths) {
             of(w).open({paths, paths + count});
@@ -460,12 +454,14 @@ private:
     void wait(const NextStep& next) {
         // Some panels take a second layout to find their size.
         layOut();
-        if (mustPresent_ || next.waitSeconds <= 0)
+        // No event says that the desktop has answered.
+        const double seconds = desktop_.valid() ? std::min(next.waitSeconds, kAnswerAwaited) : next.waitSeconds;
+        if (mustPresent_ || seconds <= 0)
             glfwPollEvents();
-        else if (std::isinf(next.waitSeconds))
+        else if (std::isinf(seconds))
             glfwWaitEvents();
         else
-            glfwWaitEventsTimeout(next.waitSeconds);
+            glfwWaitEventsTimeout(seconds);
     }
 
     const WindowSystem* system_;
@@ -496,7 +492,7 @@ Result<WindowReport> showWindow(const WindowOptions& options) {
     WindowSystem system;
     VCP_TRY(
         system.open(options.size.value_or(options.session.user.windowSize), inputs.empty() ? "vcp" : nameOf(inputs)));
-    std::future<std::optional<bool>> desktop = questionToDesktop();
+    std::future<std::optional<bool>> desktop = std::async(std::launch::async, askDesktop);
     VCP_TRY_ASSIGN(auto session, ViewSession::create(options.session, system.surfaceSource()));
     if (isReady(desktop, kThemeAwaited)) session->followDesktop(desktop.get());
     session->open(inputs);
