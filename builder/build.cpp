@@ -372,8 +372,8 @@ private:
         if (!options_.keepImages || !colourUse().materials) return placed;
         openImages(1);
         const double begins = kReadingShare + kDealingShare / 2;
-        VCP_TRY_ASSIGN(placed, storeImages(files_.soup->materials, memory_.vertexBytes, files_.images.front(),
-                                           [&](double) { return progress("sorting", begins); }));
+        VCP_TRY_ASSIGN(placed, storeImages(files_.soup->materials, options_.imageQuality, memory_.vertexBytes,
+                                           files_.images.front(), [&](double) { return progress("sorting", begins); }));
         if (!placed.empty()) openTextures();
         return placed;
     }

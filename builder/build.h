@@ -17,6 +17,7 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -48,6 +49,15 @@ struct BuildProgress {
     double seconds = 0;
 };
 
+/// How the images that a file keeps are coded. A JPEG's quality goes from 1 to 100; 0: without loss.
+struct ImageQuality {
+    /// Of the finest level; nothing: as the source has it, which is a JPEG's own blocks, and else without loss.
+    std::optional<int> finest;
+    int coarser = 90;  ///< of the levels above it, which are means of light
+
+    bool operator==(const ImageQuality&) const = default;
+};
+
 struct BuildOptions {
     std::vector<std::filesystem::path>
         inputs;          ///< inputs: files, folders of them, "-" for standard input; joined into one dataset
@@ -67,6 +77,7 @@ struct BuildOptions {
     /// Keeps the images of the materials, and where triangles of the finest level are in them; colours at vertices
     /// stay.
     bool keepImages = false;
+    ImageQuality imageQuality;
     VertexNormals vertexNormals = VertexNormals::Mesh;
     /// Is given what is read, for a picture meanwhile (mesh_sample.h); nothing where work is resumed. May be empty.
     std::shared_ptr<MeshSample> sample;

@@ -193,8 +193,9 @@ Result<void> reopenSpools(std::deque<PageSpool>& spools, const SpoolLengths& len
 }  // namespace
 
 std::string settingsText(const BuildOptions& options) {
-    return fmt::format("{} {:a} {:a} {} {} {} {} {} {}", kFileVersion, options.cell, options.error,
+    return fmt::format("{} {:a} {:a} {} {} {} {} {} {} {} {}", kFileVersion, options.cell, options.error,
                        options.errorIsRelative, int(options.colour), int(options.coarseLeaves), options.keepImages,
+                       options.imageQuality.finest.value_or(-1), options.imageQuality.coarser,
                        int(options.vertexNormals), options.format);
 }
 

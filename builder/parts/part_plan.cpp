@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <unistd.h>
+#include <array>
 #include <cerrno>
 #include <fstream>
 #include <memory>
@@ -47,17 +48,12 @@ json jsonOf(const PartPlan& plan) {
     json inputs = json::array();
     for (const PlannedInput& each : plan.inputs)
         inputs.push_back({{"path", each.path.string()}, {"stamp", each.stamp}, {"hash", each.hash}});
-    return {{"program", plan.program},
-            {"parts", plan.parts},
-            {"inputs", inputs},
-            {"output", o.output.string()},
-            {"overwrite", o.overwrite},
-            {"format", o.format},
-            {"cell", o.cell},
-            {"colour", int(o.colour)},
-            {"images", o.keepImages},
-            {"memory", o.memoryBytes},
-            {"vertex_normals", int(o.vertexNormals)}};
+    return {{"program", plan.program},  {"parts", plan.parts},
+            {"inputs", inputs},         {"output", o.output.string()},
+            {"overwrite", o.overwrite}, {"format", o.format},
+            {"cell", o.cell},           {"colour", int(o.colour)},
+            {"images", o.keepImages},   {"image_quality", {o.imageQuality.finest.value_or(-1), o.imageQuality.coarser}},
+            {"memory", o.memoryBytes},  {"vertex_normals", int(o.vertexNormals)}};
 }
 
 PartPlan planFrom(const json& j) {
@@ -75,6 +71,9 @@ PartPlan planFrom(const json& j) {
     plan.options.cell = j.at("cell").get<double>();
     plan.options.colour = ColourChoice(j.at("colour").get<int>());
     plan.options.keepImages = j.at("images").get<bool>();
+    const auto quality = j.at("image_quality").get<std::array<int, 2>>();
+    if (quality[0] >= 0) plan.options.imageQuality.finest = quality[0];
+    plan.options.imageQuality.coarser = quality[1];
     plan.options.vertexNormals = VertexNormals(j.at("vertex_normals").get<int>());
     plan.options.memoryBytes = j.at("memory").get<uint64_t>();
     return plan;

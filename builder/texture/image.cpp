@@ -1,20 +1,19 @@
 #include "builder/texture/image.h"
 
 #include <algorithm>
-#include <csetjmp>
-#include <cstdio>
 #include <cstring>
 #include <optional>
 #include <string>
 
 #include <fmt/format.h>
-#include <jpeglib.h>
-// This header comes after those that it needs.
-#include <jerror.h>
 #include <png.h>
 
 #include "builder/stream/random_bytes.h"
 #include "builder/texture/png_chunks.h"
+#include "octree/image/jpeg_failure.h"
+
+// This header comes after those that it needs.
+#include <jerror.h>
 
 namespace vcp {
 namespace {
@@ -55,31 +54,17 @@ Result<Image> decodePng(std::string_view file, const ImageLimits& limits) {
 constexpr int kMostJpegScans = 100;
 constexpr long kJpegBytes = 256L << 20;  // bytes of a progressive picture, which libjpeg holds as a whole
 
-// libjpeg reports an error by a call that must not return.
-struct JpegFailure {
-    jpeg_error_mgr base;
-    jpeg_progress_mgr progress;
-    std::jmp_buf back;
-    bool tooManyScans;
-    char message[JMSG_LENGTH_MAX];
+struct PictureFailure : JpegFailure {
+    jpeg_progress_mgr progress{};
+    bool tooManyScans = false;
 };
 
 extern "C" {
-void vcpJpegFailed(j_common_ptr info) {
-    auto* const failure = reinterpret_cast<JpegFailure*>(info->err);
-    info->err->format_message(info, failure->message);
-    std::longjmp(failure->back, 1);
-}
-void vcpJpegSilent(j_common_ptr) {}
-// A warning (truncated or damaged data) counts as damage. Traces have levels of 0 and more.
-void vcpJpegWarned(j_common_ptr info, int level) {
-    if (level < 0) vcpJpegFailed(info);
-}
 // Limits the scans: each goes over the whole picture, however few its bytes; a usual picture has some ten.
 void vcpJpegProgress(j_common_ptr info) {
     const int scans = reinterpret_cast<j_decompress_ptr>(info)->input_scan_number;
     if (scans <= kMostJpegScans) return;
-    auto* const failure = reinterpret_cast<JpegFailure*>(info->err);
+    auto* const failure = static_cast<PictureFailure*>(reinterpret_cast<JpegFailure*>(info->err));
     failure->tooManyScans = true;
     std::longjmp(failure->back, 1);
 }
@@ -91,7 +76,7 @@ constexpr uint64_t kMostJpegTexels = 8 * 64;  // texels of a byte
 // No object with a destructor lives in this function, since errors jump out of libjpeg back into it. `isWanted` looks
 // at the header.
 template <class IsWanted>
-bool runJpeg(std::string_view file, jpeg_decompress_struct& jpeg, JpegFailure& failure, Image& image,
+bool runJpeg(std::string_view file, jpeg_decompress_struct& jpeg, PictureFailure& failure, Image& image,
              IsWanted isWanted) {
     if (setjmp(failure.back)) return false;
     jpeg_create_decompress(&jpeg);
@@ -116,11 +101,8 @@ bool runJpeg(std::string_view file, jpeg_decompress_struct& jpeg, JpegFailure& f
 
 Result<Image> decodeJpeg(std::string_view file, const ImageLimits& limits) {
     jpeg_decompress_struct jpeg{};
-    JpegFailure failure{};
-    jpeg.err = jpeg_std_error(&failure.base);
-    failure.base.error_exit = vcpJpegFailed;
-    failure.base.emit_message = vcpJpegWarned;
-    failure.base.output_message = vcpJpegSilent;
+    PictureFailure failure;
+    jpeg.err = &failure.base;
     Image image;
     std::optional<Error> refused;
     const bool done = runJpeg(file, jpeg, failure, image, [&] {
@@ -154,22 +136,34 @@ Result<Image> decodeImage(std::string_view file, const ImageLimits& limits) {
     return Error{.code = ErrorCode::Unsupported, .message = "the picture is neither PNG nor JPEG"};
 }
 
-Result<Image> loadImage(const ImageSource& source, const ImageLimits& limits) {
-    if (source.bytes) return decodeImage(*source.bytes, limits);
+namespace {
+
+Error named(const ImageSource& source, Error error) {
+    error.file = source.path.string();
+    return error;
+}
+
+}  // namespace
+
+Result<std::shared_ptr<const std::string>> imageFile(const ImageSource& source, const ImageLimits& limits) {
+    if (source.bytes) return source.bytes;
     VCP_TRY_ASSIGN(auto bytes, openRandomBytes(source.path));
-    const auto named = [&](Error error) {
-        error.file = source.path.string();
-        return error;
-    };
-    const uint64_t size = bytes->size();
-    if (size > limits.fileBytes)
-        return named({.code = ErrorCode::Limit,
-                      .message = fmt::format("a picture file of more than {} MiB", limits.fileBytes >> 20)});
-    std::string file(size, '\0');
-    if (const auto read = bytes->read(0, file.data(), file.size()); !read) return named(read.error());
+    if (bytes->size() > limits.fileBytes)
+        return named(source, {.code = ErrorCode::Limit,
+                              .message = fmt::format("a picture file of more than {} MiB", limits.fileBytes >> 20)});
+    auto file = std::make_shared<std::string>(bytes->size(), '\0');
+    if (const auto read = bytes->read(0, file->data(), file->size()); !read) return named(source, read.error());
+    return std::shared_ptr<const std::string>(std::move(file));
+}
+
+Result<Image> decodeImage(const ImageSource& source, const std::string& file, const ImageLimits& limits) {
     auto image = decodeImage(file, limits);
-    if (!image) return named(image.error());
-    return image;
+    return image || source.bytes ? std::move(image) : named(source, image.error());
+}
+
+Result<Image> loadImage(const ImageSource& source, const ImageLimits& limits) {
+    VCP_TRY_ASSIGN(const auto file, imageFile(source, limits));
+    return decodeImage(source, *file, limits);
 }
 
 }  // namespace vcp

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -28,7 +30,12 @@ struct ImageLimits {
 /// more than 256 MiB); without file.
 Result<Image> decodeImage(std::string_view file, const ImageLimits& limits = {});
 
-/// Reads the file that `source` names, or decodes its bytes. Errors: as decodeImage(), and Io; with the file's name.
+/// Reads the file that `source` names, or returns its bytes. Errors: Io, Limit (too large); with the file's name.
+Result<std::shared_ptr<const std::string>> imageFile(const ImageSource& source, const ImageLimits& limits = {});
+
+/// Reads and decodes it. Errors: as imageFile() and decodeImage(); with the file's name.
 Result<Image> loadImage(const ImageSource& source, const ImageLimits& limits = {});
+/// Decodes what imageFile() returned of `source`. Errors: as decodeImage(); with the file's name.
+Result<Image> decodeImage(const ImageSource& source, const std::string& file, const ImageLimits& limits = {});
 
 }  // namespace vcp

@@ -16,8 +16,8 @@ void ImageAssembly::copyTile(const ImageLevel& level, uint64_t tile, std::span<c
                              uint32_t* to) const {
     const glm::uvec2 place = pieces_->placeOf(tile), size = level.sizeOf(place);
     for (uint32_t y = 0; y < size.y; ++y) {
-        const uint64_t row = uint64_t{place.y} * kImageTileEdge + y;
-        std::copy_n(texels.begin(), size.x, to + row * level.width + uint64_t{place.x} * kImageTileEdge);
+        const uint64_t row = uint64_t{place.y} * level.tileEdge + y;
+        std::copy_n(texels.begin(), size.x, to + row * level.width + uint64_t{place.x} * level.tileEdge);
         texels = texels.subspan(size.x);
     }
 }

@@ -9,13 +9,13 @@
 namespace vcp {
 
 glm::uvec2 ImageLevel::sizeOf(glm::uvec2 tile) const {
-    return glm::min(glm::uvec2(width, height) - tile * kImageTileEdge, glm::uvec2(kImageTileEdge));
+    return glm::min(glm::uvec2(width, height) - tile * tileEdge, glm::uvec2(tileEdge));
 }
 
-std::vector<ImageLevel> imageLevels(uint32_t width, uint32_t height, uint64_t firstTile) {
-    std::vector<ImageLevel> levels{{width, height, 0}};
+std::vector<ImageLevel> imageLevels(uint32_t width, uint32_t height, uint64_t firstTile, uint32_t tileEdge) {
+    std::vector<ImageLevel> levels{{width, height, 0, tileEdge}};
     while (levels.back().width > 1 || levels.back().height > 1)
-        levels.push_back({std::max(levels.back().width / 2, 1u), std::max(levels.back().height / 2, 1u), 0});
+        levels.push_back({std::max(levels.back().width / 2, 1u), std::max(levels.back().height / 2, 1u), 0, tileEdge});
     for (auto level = levels.rbegin(); level != levels.rend(); ++level) {
         level->firstTile = firstTile;
         firstTile += level->tiles();

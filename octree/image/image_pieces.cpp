@@ -6,7 +6,10 @@ namespace vcp {
 
 namespace {
 
-uint64_t piecesOfLevel(const ImageLevel& level) { return (level.tiles() + kPieceTiles - 1) / kPieceTiles; }
+/// Returns the most tiles of a piece.
+uint64_t pieceTiles(const ImageLevel& level) { return kPieceTexels / (uint64_t{level.tileEdge} * level.tileEdge); }
+
+uint64_t piecesOfLevel(const ImageLevel& level) { return (level.tiles() + pieceTiles(level) - 1) / pieceTiles(level); }
 
 }  // namespace
 
@@ -18,10 +21,10 @@ Result<std::shared_ptr<const ImagePieces>> ImagePieces::read(const ByteReader& r
 ImagePieces::ImagePieces(ImageTables tables) : tables_(std::move(tables)) {
     places_.reserve(tables_.tiles.size());
     for (const ImageRow& image : tables_.images) {
-        levels_.push_back(imageLevels(image.width, image.height, image.firstTile));
+        levels_.push_back(vcp::levelsOf(image));
         const std::vector<ImageLevel>& levels = levels_.back();
         auto first = uint32_t(levels.size() - 1);
-        while (first > 0 && levels[first - 1].tiles() == 1) --first;
+        while (first > 0 && std::max(levels[first - 1].width, levels[first - 1].height) <= kFirstEdge) --first;
         firstLevel_.push_back(first);
         uint64_t pieces = 1;
         for (uint32_t level = 0; level < first; ++level) pieces += piecesOfLevel(levels[level]);
@@ -55,8 +58,9 @@ ImagePiece ImagePieces::piece(uint64_t number) const {
     --before;
     while (before >= piecesOfLevel(levels[--piece.level])) before -= piecesOfLevel(levels[piece.level]);
     const ImageLevel& level = levels[piece.level];
-    piece.firstTile = level.firstTile + before * kPieceTiles;
-    piece.tiles = std::min(kPieceTiles, level.tiles() - before * kPieceTiles);
+    const uint64_t first = before * pieceTiles(level);
+    piece.firstTile = level.firstTile + first;
+    piece.tiles = std::min(pieceTiles(level), level.tiles() - first);
     return piece;
 }
 

@@ -1,5 +1,5 @@
-// The images of a file in pieces, which are read one at a time: the levels of an image that are a single tile each, or
-// up to kPieceTiles tiles of a finer level, in the order of the file (a square of 512 texels, where there is one).
+// The images of a file in pieces, which are read one at a time: the levels of an image of at most kFirstEdge texels an
+// edge, or up to kPieceTexels of a finer level, in the order of the file (a square of 512 texels, where there is one).
 #pragma once
 
 #include <cstdint>
@@ -10,7 +10,8 @@
 
 namespace vcp {
 
-inline constexpr uint64_t kPieceTiles = 64;
+inline constexpr uint32_t kFirstEdge = 64;
+inline constexpr uint64_t kPieceTexels = uint64_t{512} * 512;
 
 struct ImagePiece {
     uint32_t image = 0;

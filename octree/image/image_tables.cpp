@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include "octree/image/jpeg_tile.h"
 #include "octree/image/tile_codec.h"
 #include "octree/io/content_hash.h"
 
@@ -72,10 +73,10 @@ private:
         };
         if (row.width < 1 || row.width > kMaxImageEdge || row.height < 1 || row.height > kMaxImageEdge)
             return fail(offsetof(ImageRow, width), "its size is out of range");
-        if (row.coding != kLosslessTiles)
+        if (row.coding != kLosslessTiles && row.coding != kMixedTiles)
             return fail(offsetof(ImageRow, coding), "its coding is not known: use a newer program");
         if (row.firstTile != tiles) return fail(offsetof(ImageRow, firstTile), "its first tile is another image's");
-        const auto levels = imageLevels(row.width, row.height, tiles);
+        const auto levels = levelsOf(row);
         if (row.levels != levels.size()) return fail(offsetof(ImageRow, levels), "its levels do not suit its size");
         tiles += tilesOf(levels);
         return {};
@@ -157,16 +158,17 @@ Result<void> decodeTile(const std::string& file, const ImageTables& tables, cons
         return brokenBytes(file, fmt::format("tile {}", number), row.offset, std::move(message));
     };
     if (hashBytes(bytes) != row.hash) return fail("its hash does not match: the file was changed or damaged");
-    if (const auto done = unpackTile(bytes, size, texels); !done) return fail(done.error().message);
+    const auto done = isJpeg(bytes) ? unpackJpeg(bytes, size, texels) : unpackTile(bytes, size, texels);
+    if (!done) return fail(done.error().message);
     return {};
 }
 
 Result<void> verifyImages(const ByteReader& reader, const ImagesPlace& place,
                           const std::function<bool(uint64_t)>& progress) {
     VCP_TRY_ASSIGN(const auto tables, readImageTables(reader, place));
-    std::vector<uint32_t> texels(size_t{kImageTileEdge} * kImageTileEdge);
+    std::vector<uint32_t> texels(size_t{kLargeTileEdge} * kLargeTileEdge);
     for (const ImageRow& image : tables.images)
-        for (const ImageLevel& level : imageLevels(image.width, image.height, image.firstTile)) {
+        for (const ImageLevel& level : levelsOf(image)) {
             uint64_t number = level.firstTile;
             for (const glm::uvec2 tile : tileOrder(level)) {
                 VCP_TRY_ASSIGN(const auto stored, readTiles(reader, tables, number, 1));

@@ -3,7 +3,7 @@
 //   24 bytes an image        ImageRow
 //   16 bytes a material      MaterialRow; triangles name them by their number plus 1
 //   24 bytes a tile          TileRow: image by image, coarse levels first, Morton order (x lowest) within a level
-//   ...                      the tiles (tile_codec.h), in the order of their table, without gaps
+//   ...                      the tiles, in the order of their table, without gaps
 //
 // The header has the hash of the three tables. No column or row of an image is stored twice: filters read beyond a
 // tile's edge in the tile beside it.
@@ -23,15 +23,23 @@
 
 namespace vcp {
 
-inline constexpr uint32_t kLosslessTiles = 1;  ///< a coding: tile_codec.h
+/// How an image is coded.
+inline constexpr uint32_t kLosslessTiles = 1;  ///< tiles of kImageTileEdge (tile_codec.h)
+inline constexpr uint32_t kMixedTiles = 2;     ///< tiles of kLargeTileEdge, each without loss or a JPEG (jpeg_tile.h)
 
 struct ImageRow {
     uint32_t width = 0, height = 0;  ///< 1 to kMaxImageEdge
-    uint32_t levels = 0;             ///< as imageLevels() makes them
+    uint32_t levels = 0;             ///< as levelsOf() makes them
     uint32_t coding = kLosslessTiles;
     uint64_t firstTile = 0;  ///< of the coarsest level
 };
 static_assert(sizeof(ImageRow) == 24);
+
+/// Returns the levels of an image, the finest first. Precondition: the row was checked, or made.
+inline std::vector<ImageLevel> levelsOf(const ImageRow& image) {
+    return imageLevels(image.width, image.height, image.firstTile,
+                       image.coding == kMixedTiles ? kLargeTileEdge : kImageTileEdge);
+}
 
 /// How coordinates beyond an image's edge are read.
 enum class ImageWrap : uint8_t { Repeat, Clamp, Mirror };

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <fstream>
 #include <map>
+#include <random>
 
 #include <gtest/gtest.h>
 
@@ -13,6 +14,7 @@
 #include "octree/vcp_verify.h"
 #include "tests/support/build_in_parts.h"
 #include "tests/support/image_file.h"
+#include "tests/support/jpeg_files.h"
 #include "tests/support/mesh_files.h"
 #include "tests/support/test_folder.h"
 #include "tests/support/test_meshes.h"
@@ -53,7 +55,9 @@ protected:
 };
 
 TEST_F(ImageBuild, KeepsImagesAndWhereTheyLie) {
-    ASSERT_FALSE(built(options()).empty());
+    BuildOptions o = options();
+    o.imageQuality = {.finest = 0, .coarser = 0};
+    ASSERT_FALSE(built(o).empty());
     const auto file = openFile(output());
     ASSERT_TRUE(verifyFile(**file).ok()) << verifyFile(**file).error().line();
     auto cache = PageCache::open(output());
@@ -152,6 +156,53 @@ TEST_F(ImageBuild, IsResumedAndBuiltInParts) {
     o.overwrite = false;
     ASSERT_NO_FATAL_FAILURE(test::buildInParts(o, 3));
     EXPECT_TRUE(contentOf(output()) == whole);
+}
+
+// What levels lose is what their quality says, and the finest level of a JPEG nothing.
+TEST_F(ImageBuild, CodesImagesAsGoodAsIsAskedFor) {
+    Image photograph{600, 520, {}};
+    std::mt19937 random(1);
+    for (uint32_t y = 0; y < photograph.height; ++y)
+        for (uint32_t x = 0; x < photograph.width; ++x) {
+            const uint32_t grey = uint32_t(120 + 60 * std::sin(0.02 * x) + 40 * std::cos(0.05 * y)) + random() % 16;
+            photograph.texels.push_back(0xff000000u | grey | grey << 8 | (grey / 2) << 16);
+        }
+    const std::string jpeg = test::jpegOf(photograph, {.quality = 80, .sampling = {1, 1}});
+    // A file's content says what it is, and not its name.
+    std::ofstream(folder_ / "floor.png", std::ios::binary) << jpeg;
+    const Texture texture(*decodeImage(jpeg));
+    std::map<int, uint64_t> bytes;
+    for (const ImageQuality& quality : {ImageQuality(), ImageQuality{0, 0}, ImageQuality{50, 50}}) {
+        SCOPED_TRACE(quality.coarser);
+        BuildOptions o = options();
+        o.imageQuality = quality;
+        const std::string whole = built(o);
+        ASSERT_FALSE(whole.empty());
+        o.threads = 1;
+        EXPECT_TRUE(built(o) == whole) << "one thread";
+        const auto file = openFile(output());
+        ASSERT_TRUE(verifyFile(**file).ok()) << verifyFile(**file).error().line();
+        const auto header = readDataset(**file)->header;
+        bytes[quality.coarser] = header.images.bytes;
+        const auto set = test::wholeImages(**file, header.images);
+        ASSERT_TRUE(set.ok());
+        for (size_t l = 0; l < texture.levels().size(); ++l) {
+            const Image& level = texture.levels()[l];
+            double squares = 0;
+            for (size_t i = 0; i < level.texels.size(); ++i)
+                for (int c = 0; c < 3; ++c) {
+                    const int apart = int(level.texels[i] >> 8 * c & 255u) -
+                                      int(set->images()[0].levels[l].texels.get()[i] >> 8 * c & 255u);
+                    squares += apart * apart;
+                }
+            const double error = std::sqrt(squares / (3 * double(level.texels.size())));
+            const bool isExact = (l == 0 ? quality.finest.value_or(0) : quality.coarser) == 0;
+            EXPECT_LE(error, isExact ? 0.0 : quality.coarser == 90 ? 3.0 : 10.0) << "level " << l;
+        }
+    }
+    EXPECT_LT(bytes[50], bytes[90]);
+    EXPECT_LT(bytes[90], 3 * bytes[0] / 4);
+    EXPECT_LT(bytes[90], 2 * jpeg.size());
 }
 
 TEST_F(ImageBuild, WithoutImagesFilesAreAsEver) {

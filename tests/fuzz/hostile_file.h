@@ -61,7 +61,7 @@ inline void hashImages(std::vector<std::byte>& file, ImagesPlace& place) {
         ImageRow row;
         std::memcpy(&row, &file[place.offset + i * sizeof row], sizeof row);
         if (std::min(row.width, row.height) < 1 || std::max(row.width, row.height) > kMaxImageEdge) return;
-        tiles += tilesOf(imageLevels(row.width, row.height, 0));
+        tiles += tilesOf(levelsOf(row));
     }
     at += uint64_t{place.materials} * sizeof(MaterialRow);
     const uint64_t end = at + tiles * sizeof(TileRow);

@@ -1,5 +1,6 @@
 #include "viewer/command/build_arguments.h"
 
+#include <charconv>
 #include <memory>
 
 #include <fmt/format.h>
@@ -27,6 +28,15 @@ std::optional<VertexNormals> normalsNamed(const std::string& name) {
     if (name == "mesh") return VertexNormals::Mesh;
     if (name == "computed") return VertexNormals::Computed;
     return std::nullopt;
+}
+
+std::optional<ImageQuality> imageQualityNamed(const std::string& name) {
+    if (name == "source") return ImageQuality();
+    if (name == "lossless") return ImageQuality{0, 0};
+    int quality = 0;
+    const auto [end, error] = std::from_chars(name.data(), name.data() + name.size(), quality);
+    if (error != std::errc() || end != name.data() + name.size() || quality < 1 || quality > 100) return std::nullopt;
+    return ImageQuality{quality, quality};
 }
 
 std::optional<CoarseLeaves> leavesNamed(const std::string& name) {
@@ -94,6 +104,14 @@ void addImages(CLI::App& app, BuildOptions& options) {
     app.add_flag("--images", options.keepImages,
                  "Keep the images of materials, too, as sharp as they are, with their place on the triangles; browsers "
                  "do not draw from them yet");
+    addParsed(
+        app, "--colour-quality,--color-quality", options.imageQuality, imageQualityNamed,
+        "source, lossless or 1 to 100",
+        "How --images codes them: source (the finest level as the mesh brings it: a JPEG's own blocks, and without "
+        "loss what is PNG; coarser ones as JPEGs of quality 90), lossless, or all as JPEGs of a quality of 1 to "
+        "100")
+        ->type_name("source|lossless|N")
+        ->default_str("source");
 }
 
 void addVertexNormals(CLI::App& app, BuildOptions& options) {

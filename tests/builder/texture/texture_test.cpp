@@ -1,16 +1,15 @@
 #include "builder/texture/texture.h"
 
 #include <cmath>
-#include <cstdio>
 #include <fstream>
 #include <random>
 
 #include <gtest/gtest.h>
-#include <jpeglib.h>
 #include <png.h>
 
 #include "builder/stream/colour_encoding.h"
 #include "builder/texture/png_chunks.h"
+#include "tests/support/jpeg_files.h"
 #include "tests/support/peak_memory.h"
 #include "tests/support/png_files.h"
 #include "tests/support/test_folder.h"
@@ -41,37 +40,7 @@ std::string pngOf(const Image& image) {
     return file;
 }
 
-std::string jpegOf(const Image& image, bool progressive, const std::vector<jpeg_scan_info>& scans = {}) {
-    jpeg_compress_struct jpeg{};
-    jpeg_error_mgr errors{};
-    jpeg.err = jpeg_std_error(&errors);
-    jpeg_create_compress(&jpeg);
-    unsigned char* data = nullptr;
-    unsigned long bytes = 0;
-    jpeg_mem_dest(&jpeg, &data, &bytes);
-    jpeg.image_width = image.width;
-    jpeg.image_height = image.height;
-    jpeg.input_components = 4;
-    jpeg.in_color_space = JCS_EXT_RGBA;
-    jpeg_set_defaults(&jpeg);
-    jpeg_set_quality(&jpeg, 95, TRUE);
-    if (progressive) jpeg_simple_progression(&jpeg);
-    if (!scans.empty()) {
-        jpeg.scan_info = scans.data();
-        jpeg.num_scans = int(scans.size());
-    }
-    jpeg_start_compress(&jpeg, TRUE);
-    while (jpeg.next_scanline < jpeg.image_height) {
-        auto* row = const_cast<JSAMPROW>(
-            reinterpret_cast<const JSAMPLE*>(image.texels.data() + jpeg.next_scanline * image.width));
-        jpeg_write_scanlines(&jpeg, &row, 1);
-    }
-    jpeg_finish_compress(&jpeg);
-    std::string file(reinterpret_cast<const char*>(data), bytes);
-    jpeg_destroy_compress(&jpeg);
-    std::free(data);
-    return file;
-}
+using test::jpegOf;
 
 TEST(Image, DecodesPngExactlyAndJpegNearly) {
     const Image image = noise(37, 11, 1);
@@ -80,7 +49,7 @@ TEST(Image, DecodesPngExactlyAndJpegNearly) {
     EXPECT_EQ(png->texels, image.texels);
     Image flat{32, 8, std::vector<Rgba8>(256, texelOf(200, 100, 50))};
     for (const bool progressive : {false, true}) {
-        const auto jpeg = decodeImage(jpegOf(flat, progressive));
+        const auto jpeg = decodeImage(jpegOf(flat, {.progressive = progressive}));
         ASSERT_TRUE(jpeg.ok()) << jpeg.error().line();
         ASSERT_EQ(jpeg->texels.size(), 256u);
         EXPECT_NEAR(jpeg->texels[77] & 0xFF, 200, 3);
@@ -91,7 +60,7 @@ TEST(Image, DecodesPngExactlyAndJpegNearly) {
 
 TEST(Image, EveryTruncationIsAnError) {
     const Image image = noise(16, 16, 2);
-    for (const std::string& file : {pngOf(image), jpegOf(image, false), jpegOf(image, true)})
+    for (const std::string& file : {pngOf(image), jpegOf(image), jpegOf(image, {.progressive = true})})
         for (size_t kept = 0; kept + 12 < file.size(); ++kept)
             EXPECT_FALSE(decodeImage(file.substr(0, kept)).ok()) << kept << " of " << file.size();
 }
@@ -100,7 +69,7 @@ TEST(Image, FlippedBytesAreReadOrRefused) {
     const Image image = noise(16, 16, 3);
     std::mt19937 random(4);
     size_t refused = 0;
-    for (const std::string& file : {pngOf(image), jpegOf(image, false), jpegOf(image, true)})
+    for (const std::string& file : {pngOf(image), jpegOf(image), jpegOf(image, {.progressive = true})})
         for (int i = 0; i < 300; ++i) {
             std::string broken = file;
             broken[random() % broken.size()] ^= char(1 + random() % 255);
@@ -162,14 +131,15 @@ TEST(Image, SizesAreCheckedAgainstTheBytesThatAreThere) {
                     "cannot hold 8000 by 8000");
     refused(test::pngFile(0x7FFFFFFF, 1, 8, 0, "few"), ErrorCode::InvalidInput, "cannot hold");
     refused(test::pngFile(8, 8, 8, 5, "few"), ErrorCode::InvalidInput, "no header");
-    std::string file = jpegOf(noise(64, 64, 6), false);
+    std::string file = jpegOf(noise(64, 64, 6));
     const size_t frame = file.find("\xFF\xC0");
     ASSERT_NE(frame, std::string::npos);
     file.replace(frame + 5, 4, std::string("\x20\0\x20\0", 4));
     refused(file, ErrorCode::InvalidInput, "cannot hold 8192 by 8192");
     // What deflate makes smallest is not refused.
     EXPECT_TRUE(decodeImage(test::pngFile(4000, 4000, 8, 0, std::string(4001 * 4000, '\0'))).ok());
-    const auto blank = decodeImage(jpegOf({2048, 2048, std::vector<Rgba8>(2048 * 2048, kWhite)}, true));
+    const auto blank =
+        decodeImage(jpegOf({2048, 2048, std::vector<Rgba8>(2048 * 2048, kWhite)}, {.progressive = true}));
     EXPECT_TRUE(blank.ok()) << blank.error().line();
 }
 
@@ -183,14 +153,14 @@ TEST(Image, AJpegOfManyScansIsRefused) {
             scans.push_back({.comps_in_scan = 1, .component_index = {channel}, .Ss = i, .Se = i, .Ah = 0, .Al = 0});
     const Image picture = noise(16, 16, 7);
     ASSERT_GT(scans.size(), 150u);
-    const auto image = decodeImage(jpegOf(picture, true, scans));
+    const auto image = decodeImage(jpegOf(picture, {.scans = scans}));
     ASSERT_FALSE(image.ok());
     EXPECT_EQ(image.error().code, ErrorCode::Limit) << image.error().line();
     EXPECT_NE(image.error().line().find("more than 100 scans"), std::string::npos) << image.error().line();
 }
 
 TEST(Image, AProgressiveJpegBeyondItsMemoryIsALimit) {
-    std::string file = jpegOf(noise(64, 64, 8), true);
+    std::string file = jpegOf(noise(64, 64, 8), {.progressive = true});
     const size_t frame = file.find("\xFF\xC2");
     ASSERT_NE(frame, std::string::npos);
     file.replace(frame + 5, 4, std::string("\x2A\0\x2A\0", 4));  // 10752 by 10752

@@ -54,7 +54,7 @@ TEST_F(Pieces, EachTileIsInOne) {
     for (uint64_t number = 0; number < pieces_->count(); ++number) {
         const ImagePiece piece = pieces_->piece(number);
         EXPECT_EQ(piece.firstTile, tile);
-        EXPECT_LE(piece.tiles, kPieceTiles);
+        EXPECT_LE(pieces_->texelsOf(piece), kPieceTexels);
         EXPECT_EQ(pieces_->texelsOf(piece), pieces_->readPiece(*file_, number)->size());
         const auto [first, end] = pieces_->piecesOf(piece.image, piece.level);
         EXPECT_TRUE(first <= number && number < end);

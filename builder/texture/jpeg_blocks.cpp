@@ -1,0 +1,150 @@
+#include "builder/texture/jpeg_blocks.h"
+
+#include <algorithm>
+#include <cstdlib>
+#include <cstring>
+#include <mutex>
+
+#include "octree/image/jpeg_failure.h"
+
+namespace vcp {
+
+namespace {
+
+/// Writes blocks for libjpeg. No object with a destructor lives in its member functions, since errors jump out of
+/// libjpeg back into them.
+class TileWriter {
+public:
+    TileWriter() { jpeg_.err = &failure_.base; }
+    ~TileWriter() {
+        jpeg_destroy_compress(&jpeg_);
+        std::free(bytes_);
+    }
+    TileWriter(const TileWriter&) = delete;
+    TileWriter& operator=(const TileWriter&) = delete;
+
+    /// Makes room for the blocks of a tile of a picture, and takes them. `corner`: of the tile, in texels.
+    bool take(jpeg_decompress_struct& picture, jvirt_barray_ptr* blocks, glm::uvec2 corner, glm::uvec2 size) {
+        if (setjmp(failure_.back)) return false;
+        jpeg_create_compress(&jpeg_);
+        jpeg_mem_dest(&jpeg_, &bytes_, &count_);
+        jpeg_copy_critical_parameters(&picture, &jpeg_);
+        jpeg_.image_width = size.x;
+        jpeg_.image_height = size.y;
+        jpeg_.optimize_coding = TRUE;
+        for (int c = 0; c < picture.num_components; ++c) {
+            const jpeg_component_info& from = picture.comp_info[c];
+            const auto blocksOf = [](uint32_t texels, int factor, int most) {
+                return (texels * uint32_t(factor) + uint32_t(most) * DCTSIZE - 1) / (uint32_t(most) * DCTSIZE);
+            };
+            const auto height = uint32_t(from.v_samp_factor);
+            width_[c] = blocksOf(size.x, from.h_samp_factor, picture.max_h_samp_factor);
+            height_[c] = blocksOf(size.y, from.v_samp_factor, picture.max_v_samp_factor);
+            blocks_[c] = jpeg_.mem->request_virt_barray(reinterpret_cast<j_common_ptr>(&jpeg_), JPOOL_IMAGE, TRUE,
+                                                        width_[c], (height_[c] + height - 1) / height * height, height);
+        }
+        jpeg_write_coefficients(&jpeg_, blocks_);
+        for (int c = 0; c < picture.num_components; ++c) {
+            const jpeg_component_info& from = picture.comp_info[c];
+            const glm::uvec2 first(
+                corner.x * uint32_t(from.h_samp_factor) / uint32_t(picture.max_h_samp_factor * DCTSIZE),
+                corner.y * uint32_t(from.v_samp_factor) / uint32_t(picture.max_v_samp_factor * DCTSIZE));
+            for (uint32_t y = 0; y < height_[c]; ++y) {
+                const JBLOCKROW source = picture.mem->access_virt_barray(reinterpret_cast<j_common_ptr>(&picture),
+                                                                         blocks[c], first.y + y, 1, FALSE)[0];
+                const JBLOCKROW target =
+                    jpeg_.mem->access_virt_barray(reinterpret_cast<j_common_ptr>(&jpeg_), blocks_[c], y, 1, TRUE)[0];
+                std::memcpy(target, source + first.x, width_[c] * sizeof(JBLOCK));
+            }
+        }
+        return true;
+    }
+
+    bool write() {
+        if (setjmp(failure_.back)) return false;
+        jpeg_finish_compress(&jpeg_);
+        return true;
+    }
+
+    [[nodiscard]] std::vector<std::byte> bytes() const {
+        const auto* const first = reinterpret_cast<const std::byte*>(bytes_);
+        return {first, first + count_};
+    }
+
+private:
+    jpeg_compress_struct jpeg_{};
+    JpegFailure failure_;
+    unsigned char* bytes_ = nullptr;
+    unsigned long count_ = 0;
+    jvirt_barray_ptr blocks_[MAX_COMPONENTS] = {};
+    uint32_t width_[MAX_COMPONENTS] = {}, height_[MAX_COMPONENTS] = {};  // in blocks
+};
+
+class Blocks final : public JpegBlocks {
+public:
+    Blocks() { jpeg_.err = &failure_.base; }
+    ~Blocks() override { jpeg_destroy_decompress(&jpeg_); }
+
+    /// Returns whether it has the blocks.
+    bool read(const std::string& file, uint64_t memoryBytes) {
+        if (setjmp(failure_.back)) return false;
+        jpeg_create_decompress(&jpeg_);
+        jpeg_mem_src(&jpeg_, reinterpret_cast<const unsigned char*>(file.data()),
+                     static_cast<unsigned long>(file.size()));
+        jpeg_read_header(&jpeg_, TRUE);
+        if (!canBeCut() || bytesOfBlocks() > memoryBytes) return false;
+        blocks_ = jpeg_read_coefficients(&jpeg_);
+        return true;
+    }
+
+    [[nodiscard]] std::vector<std::byte> tile(const ImageLevel& level, glm::uvec2 tile) const override {
+        TileWriter writer;
+        {
+            // libjpeg notes what was asked for.
+            const std::scoped_lock lock(mutex_);
+            if (!writer.take(jpeg_, blocks_, tile * level.tileEdge, level.sizeOf(tile))) return {};
+        }
+        return writer.write() ? writer.bytes() : std::vector<std::byte>();
+    }
+
+private:
+    /// Whether tiles begin at whole blocks, and their colours are what tiles have (unpackJpeg()).
+    [[nodiscard]] bool canBeCut() const {
+        if (jpeg_.jpeg_color_space != JCS_YCbCr && jpeg_.jpeg_color_space != JCS_GRAYSCALE) return false;
+        const auto suits = [](int factor, int most) {
+            return factor == most || factor * 2 == most || factor * 4 == most;
+        };
+        for (int c = 0; c < jpeg_.num_components; ++c) {
+            const jpeg_component_info& info = jpeg_.comp_info[c];
+            if (!suits(info.h_samp_factor, mostOf(&jpeg_component_info::h_samp_factor)) ||
+                !suits(info.v_samp_factor, mostOf(&jpeg_component_info::v_samp_factor)))
+                return false;
+        }
+        return true;
+    }
+    /// The largest factor of the components; libjpeg says it only once it has begun to decode.
+    [[nodiscard]] int mostOf(int jpeg_component_info::*factor) const {
+        int most = 1;
+        for (int c = 0; c < jpeg_.num_components; ++c) most = std::max(most, jpeg_.comp_info[c].*factor);
+        return most;
+    }
+    [[nodiscard]] uint64_t bytesOfBlocks() const {
+        return uint64_t{jpeg_.image_width} * jpeg_.image_height * uint64_t(jpeg_.num_components) * sizeof(JCOEF);
+    }
+
+    mutable jpeg_decompress_struct jpeg_{};
+    mutable std::mutex mutex_;
+    JpegFailure failure_;
+    jvirt_barray_ptr* blocks_ = nullptr;
+};
+
+}  // namespace
+
+std::unique_ptr<JpegBlocks> JpegBlocks::read(const std::string& file, uint64_t memoryBytes) {
+    if (!file.starts_with("\xFF\xD8")) return nullptr;
+    auto blocks = std::make_unique<Blocks>();
+    if (!blocks->read(file, memoryBytes)) return nullptr;
+    return blocks;
+}
+
+}  // namespace vcp

@@ -1,0 +1,28 @@
+// The blocks of a JPEG picture, cut into tiles that are JPEGs of their own, without decoding them to texels: no tile
+// differs from the picture, but for colours beside a tile's edge, where the picture has fewer of them than of light.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <glm/vec2.hpp>
+
+#include "octree/image/image_levels.h"
+
+namespace vcp {
+
+class JpegBlocks {
+public:
+    /// Reads the blocks of a picture into at most about `memoryBytes`. `file` is the whole file, which was decoded
+    /// before. Returns nothing where it is no JPEG, its blocks cannot be cut, or the memory is too little.
+    static std::unique_ptr<JpegBlocks> read(const std::string& file, uint64_t memoryBytes);
+    virtual ~JpegBlocks() = default;
+
+    /// Returns a tile of the picture's finest level; empty where there is no memory. Any thread.
+    [[nodiscard]] virtual std::vector<std::byte> tile(const ImageLevel& level, glm::uvec2 tile) const = 0;
+};
+
+}  // namespace vcp
