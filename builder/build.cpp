@@ -282,9 +282,10 @@ private:
     /// Checks the free space now: a disk that is too small would be noticed only after hours.
     Result<void> checkSpace() const {
         const uint64_t temp = expectedTempBytes(measures_.triangles, memory_.tempBytes), there = space_.diskBytes();
+        const uint64_t images = mayKeepImages() ? expectedImageBytes(files_.soup->materials) : 0;
         const std::array<SpaceNeed, 2> needs{
             {{space_.folder().path(), temp > there ? temp - there : 0, "temporary folder"},
-             {options_.output, expectedFileBytes(measures_.triangles), "folder"}}};
+             {options_.output, expectedFileBytes(measures_.triangles) + images, "folder"}}};
         auto checked = checkFreeSpace(needs);
         if (checked) return {};
         Error error = checked.error();
@@ -319,10 +320,11 @@ private:
 
     /// Returns how many triangles a bin may have: parts need several bins each, to be equally large.
     [[nodiscard]] uint64_t binTriangles(const PageChoice& choice) const {
-        if (parts_ == 0) return memory_.binTriangles;
+        const uint64_t most = memory_.binTriangles(mayKeepImages());
+        if (parts_ == 0) return most;
         uint64_t all = 0;
         for (const auto& [page, count] : choice.counts) all += count;
-        return std::min(memory_.binTriangles, all / (uint64_t{kBinsOfPart} * parts_) + 1);
+        return std::min(most, all / (uint64_t{kBinsOfPart} * parts_) + 1);
     }
 
     /// Returns the first bin of each part, and the number of bins: runs with about as many triangles each.
@@ -355,7 +357,7 @@ private:
             .mostLevelsBelow = plan_.hasSlabs ? mostLevelsBelow(plan_.frame, measures_) : 0,
             .mayBeCoarser = plan_.hasSlabs && options_.cell <= 0,
             .marginCells = plan_.marginCells(),
-            .uncounted = parts_ == 0 ? memory_.binTriangles : 0,
+            .uncounted = parts_ == 0 ? memory_.binTriangles(mayKeepImages()) : 0,
             .mostPages = memory_.mostCountedPages(),
             .progress = [&](double part) { return progress("sorting", kReadingShare + kDealingShare / 2 * part); }};
         auto choice = arena_.execute([&] { return choosePages(choosing); });
@@ -365,15 +367,21 @@ private:
         return choice;
     }
 
+    /// Whether there are images to keep, as far as is known before they are read.
+    [[nodiscard]] bool mayKeepImages() const {
+        const auto hasImage = [](const Material& material) { return material.image.exists(); };
+        return keepsImages(options_) && colourUse().materials && std::ranges::any_of(files_.soup->materials, hasImage);
+    }
+
     /// Codes the images that the file is to keep. Returns what it has of each of the soup's materials; empty where that
     /// is nothing.
     Result<std::vector<PlacedMaterial>> keepImages() {
         std::vector<PlacedMaterial> placed;
-        if (!options_.keepImages || !colourUse().materials) return placed;
+        if (!mayKeepImages()) return placed;
         openImages(1);
         const double begins = kReadingShare + kDealingShare / 2;
-        VCP_TRY_ASSIGN(placed, storeImages(files_.soup->materials, options_.imageQuality, memory_.vertexBytes,
-                                           files_.images.front(), [&](double) { return progress("sorting", begins); }));
+        VCP_TRY_ASSIGN(placed, storeImages(files_.soup->materials, options_, memory_.vertexBytes, files_.images.front(),
+                                           report_.warnings, [&](double) { return progress("sorting", begins); }));
         if (!placed.empty()) openTextures();
         return placed;
     }
@@ -702,12 +710,12 @@ namespace {
 template <class Work>
 auto withPlan(const BuildOptions& options, const Work& work) -> decltype(work(options, MemoryPlan(), 1u)) {
     if (options.inputs.empty()) return Error{.code = ErrorCode::Usage, .message = "no input mesh given"};
-    if (options.keepImages && options.error > 0)
+    if (keepsImages(options) && options.error > 0)
         return Error{.code = ErrorCode::Usage,
                      .message = "images lie on the mesh's own triangles; leave out the error that allows others"};
     const unsigned threads = threadsOf(options);
-    VCP_TRY_ASSIGN(auto plan, planMemory(options.memoryBytes > 0 ? options.memoryBytes : defaultMemoryBytes(), threads,
-                                         options.keepImages));
+    VCP_TRY_ASSIGN(auto plan,
+                   planMemory(options.memoryBytes > 0 ? options.memoryBytes : defaultMemoryBytes(), threads));
     BuildOptions expanded = options;
     VCP_TRY_ASSIGN(auto inputs, expandInputs(options.inputs));
     expanded.inputs = std::move(inputs);

@@ -9,7 +9,7 @@
 // What passes between them lies on temporary files (spill/), in memory while
 // there is room. A journal (checkpoint.h) says how far things are: after an interruption the build goes on
 // from there.
-// The output is the same bytes for any number of threads, any memory, any order of the triangles and however
+// The output is the same bytes for any number of threads, any memory that each image fits, any order of the triangles and however
 // often the build was interrupted.
 #pragma once
 
@@ -74,9 +74,9 @@ struct BuildOptions {
     double checkpointSeconds = 15;  ///< least time between checkpoints, which make what is done durable
     ColourChoice colour = ColourChoice::Auto;
     CoarseLeaves coarseLeaves = CoarseLeaves::Slabs;
-    /// Keeps the images of the materials, and where triangles of the finest level are in them; colours at vertices
-    /// stay.
-    bool keepImages = false;
+    /// Keeps the images of the materials that colour comes from, and where triangles of the finest level are in them;
+    /// colours at vertices stay. Nothing: where the finest level is the mesh.
+    std::optional<bool> keepImages;
     ImageQuality imageQuality;
     VertexNormals vertexNormals = VertexNormals::Mesh;
     /// Is given what is read, for a picture meanwhile (mesh_sample.h); nothing where work is resumed. May be empty.
@@ -85,6 +85,9 @@ struct BuildOptions {
     /// then it is not called again. May be empty.
     std::function<bool(const BuildProgress&)> progress;
 };
+
+/// Whether a build keeps images, where the mesh has some.
+inline bool keepsImages(const BuildOptions& options) { return options.keepImages.value_or(options.error == 0); }
 
 struct BuildFigures {
     uint64_t triangles = 0;            ///< triangles read

@@ -194,9 +194,10 @@ Result<void> reopenSpools(std::deque<PageSpool>& spools, const SpoolLengths& len
 
 std::string settingsText(const BuildOptions& options) {
     return fmt::format("{} {:a} {:a} {} {} {} {} {} {} {} {}", kFileVersion, options.cell, options.error,
-                       options.errorIsRelative, int(options.colour), int(options.coarseLeaves), options.keepImages,
-                       options.imageQuality.finest.value_or(-1), options.imageQuality.coarser,
-                       int(options.vertexNormals), options.format);
+                       options.errorIsRelative, int(options.colour), int(options.coarseLeaves), keepsImages(options),
+                       keepsImages(options) ? options.imageQuality.finest.value_or(-1) : 0,
+                       keepsImages(options) ? options.imageQuality.coarser : 0, int(options.vertexNormals),
+                       options.format);
 }
 
 std::string buildFingerprint(const BuildOptions& options) {

@@ -11,6 +11,7 @@
 #include <glm/geometric.hpp>
 
 #include "builder/build_sample.h"
+#include "builder/image_store.h"
 #include "builder/lattice/exact_sum.h"
 #include "builder/memory_plan.h"
 #include "builder/mesh/open_mesh.h"
@@ -24,6 +25,8 @@ namespace {
 constexpr double kTempBytesPerTriangle = 112, kFileBytesPerTriangle = 5;
 // What colours from images add in the file; a sample has none.
 constexpr double kImageBytesPerTriangle = 2;
+// What their places in images add where these are kept.
+constexpr double kPlaceBytesPerTriangle = 2.5;
 // Bytes of a triangle in memory where there is room for all, 120 to 195 for scans, and what comes with the first ones.
 constexpr double kMemoryBytesPerTriangle = 200, kFirstMemoryBytes = 20e6;
 // A machine may be slower by so much than the one that the time was measured on.
@@ -160,7 +163,7 @@ Result<BuildEstimate> estimateBuild(const BuildOptions& options) {
     SoupMeasures& m = estimate.measures;
     m.boundsMin = glm::dvec3(std::numeric_limits<double>::infinity());
     m.boundsMax = -m.boundsMin;
-    uint64_t measured = 0;
+    uint64_t measured = 0, imageBytes = 0;
     MeshChunk chunk;
     BuildSample sample;
     const auto begins = std::chrono::steady_clock::now();
@@ -175,6 +178,7 @@ Result<BuildEstimate> estimateBuild(const BuildOptions& options) {
             if (options.progress && !options.progress({.stage = "reading", .fraction = 0, .triangles = m.triangles}))
                 return Error::cancelled();
         }
+        if (keepsImages(options)) imageBytes += expectedImageBytes(stream->materials());
         measured += measurer.measured();
         m.area += measurer.area();
         m.length += measurer.length();
@@ -202,7 +206,8 @@ Result<BuildEstimate> estimateBuild(const BuildOptions& options) {
                                          uint64_t(kFirstMemoryBytes + kMemoryBytesPerTriangle * double(m.triangles)));
     const bool hasImages =
         m.hasMaterials && (options.colour == ColourChoice::Auto || options.colour == ColourChoice::Texture);
-    estimate.fileBytes = uint64_t((figures.fileBytes + (hasImages ? kImageBytesPerTriangle : 0)) * double(m.triangles));
+    const double besides = hasImages ? kImageBytesPerTriangle + (imageBytes > 0 ? kPlaceBytesPerTriangle : 0) : 0;
+    estimate.fileBytes = uint64_t((figures.fileBytes + besides) * double(m.triangles)) + (hasImages ? imageBytes : 0);
     estimate.seconds = reading + figures.seconds * double(m.triangles);
     // A checkpoint writes all that is held in memory.
     const bool mayCheckpoint = kSlower * estimate.seconds > options.checkpointSeconds;

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <bit>
 #include <cstring>
+#include <filesystem>
 #include <map>
+#include <numeric>
 #include <optional>
 
 #include <oneapi/tbb/parallel_for.h>
@@ -19,6 +21,10 @@ namespace {
 
 // Coordinates have so many bits more than tell texels apart.
 constexpr uint32_t kBitsBelowTexels = 5;
+// Tiles that are coded before they are written.
+constexpr size_t kTilesAtOnce = 64;
+// What images take in a file, of what their own files take: JPEGs with their coarser levels, and PNGs.
+constexpr double kStoredOfJpeg = 1.5, kStoredOfPng = 0.9;
 
 /// Names an image by where it comes from: it is decoded once for all materials that have it.
 using ImageKey = std::pair<std::filesystem::path, const std::string*>;
@@ -39,50 +45,60 @@ std::vector<uint32_t> texelsOf(const Image& image, const ImageLevel& level, glm:
     return texels;
 }
 
-/// Codes a tile. `quality`: of a JPEG; 0: without loss.
-std::vector<std::byte> packed(const std::vector<uint32_t>& texels, glm::uvec2 size, int quality) {
-    std::vector<std::byte> exact = packTile(texels, size);
+/// Codes a tile in as few bytes as it may have. `blocks`: of the source's JPEG; may be null. `quality`: of a JPEG that
+/// it may be, too; 0: none.
+std::vector<std::byte> packed(const Image& image, const ImageLevel& level, glm::uvec2 tile, const JpegBlocks* blocks,
+                              int quality) {
+    const glm::uvec2 size = level.sizeOf(tile);
+    const std::vector<uint32_t> texels = texelsOf(image, level, tile);
+    std::vector<std::byte> least = packTile(texels, size);
+    const auto take = [&](std::vector<std::byte> other) {
+        if (!other.empty() && other.size() < least.size()) least = std::move(other);
+    };
+    if (blocks != nullptr) take(blocks->tile(level, tile));
     const auto isOpaque = [](uint32_t texel) { return texel >> 24 == 255; };
-    if (quality == 0 || !std::all_of(texels.begin(), texels.end(), isOpaque)) return exact;
-    auto lossy = packJpeg(texels, size, quality);
-    return lossy && lossy->size() < exact.size() ? *std::move(lossy) : exact;
+    if (quality > 0 && std::all_of(texels.begin(), texels.end(), isOpaque))
+        if (auto coded = packJpeg(texels, size, quality)) take(*std::move(coded));
+    return least;
 }
 
-/// An image that is to be stored.
-struct SourceImage {
-    std::shared_ptr<const std::string> file;
-    Texture texture;
-};
-
-/// Appends the tiles of an image, coarse levels first. `memoryBytes`: for blocks of a JPEG.
-Result<void> appendTiles(const SourceImage& image, const std::vector<ImageLevel>& levels, const ImageQuality& quality,
-                         uint64_t memoryBytes, PageSpool& spool) {
-    const auto blocks = quality.finest ? nullptr : JpegBlocks::read(*image.file, memoryBytes);
+/// Appends the tiles of an image, coarse levels first. `blocks`: of its JPEG; may be null.
+Result<void> appendTiles(const Texture& texture, const std::vector<ImageLevel>& levels, const JpegBlocks* blocks,
+                         const ImageQuality& quality, PageSpool& spool) {
     for (size_t l = levels.size(); l-- > 0;) {
         const std::vector<glm::uvec2> order = tileOrder(levels[l]);
-        std::vector<StoredPage> tiles(order.size());
-        tbb::parallel_for(size_t{0}, order.size(), [&](size_t i) {
-            std::vector<std::byte>& tile = tiles[i].geometry;
-            if (l == 0 && blocks) tile = blocks->tile(levels[l], order[i]);
-            if (tile.empty())
-                tile = packed(texelsOf(image.texture.levels()[l], levels[l], order[i]), levels[l].sizeOf(order[i]),
-                              l > 0 ? quality.coarser : quality.finest.value_or(0));
-        });
-        for (const StoredPage& tile : tiles) VCP_TRY(spool.append({}, tile));
+        const bool isFinest = l == 0;
+        for (size_t first = 0; first < order.size(); first += kTilesAtOnce) {
+            std::vector<StoredPage> tiles(std::min(kTilesAtOnce, order.size() - first));
+            tbb::parallel_for(size_t{0}, tiles.size(), [&](size_t i) {
+                tiles[i].geometry =
+                    packed(texture.levels()[l], levels[l], order[first + i], isFinest ? blocks : nullptr,
+                           isFinest ? quality.finest.value_or(0) : quality.coarser);
+            });
+            for (const StoredPage& tile : tiles) VCP_TRY(spool.append({}, tile));
+        }
     }
     return {};
 }
 
-/// Loads an image; nothing where it cannot be read. Errors: Limit.
-Result<std::optional<SourceImage>> loadSource(const Material& material, uint64_t imageBytes) {
+/// An image that is to be stored.
+struct SourceImage {
+    Texture texture;
+    std::unique_ptr<JpegBlocks> blocks;  // of the source's JPEG; may be null
+};
+
+/// Loads an image; nothing where it cannot be read. `withBlocks`: if it is a JPEG. Errors: Limit.
+Result<std::optional<SourceImage>> loadSource(const Material& material, bool withBlocks, uint64_t imageBytes) {
     ImageLimits limits;
-    // Its levels take a third as much again, and the coarser ones are made while the image itself is there.
-    const uint64_t most = imageBytes / 2;
+    // Its levels take a third as much again, and its blocks up to half as much again.
+    const uint64_t most = imageBytes / 3;
     const bool isScarce = most < limits.bytes;
     limits.bytes = std::min(limits.bytes, most);
-    auto file = imageFile(material.image, limits);
+    const auto file = imageFile(material.image, limits);
     auto image = file ? decodeImage(material.image, **file, limits) : file.error();
-    if (image) return std::optional(SourceImage{*file, Texture(*std::move(image), material.wrapU, material.wrapV)});
+    if (image)
+        return std::optional(SourceImage{Texture(*std::move(image), material.wrapU, material.wrapV),
+                                         withBlocks ? JpegBlocks::read(**file) : nullptr});
     if (image.error().code != ErrorCode::Limit || !isScarce) return std::optional<SourceImage>();
     Error error = image.error();
     error.message += "; where that is for lack of memory, let the memory cap be larger";
@@ -91,8 +107,9 @@ Result<std::optional<SourceImage>> loadSource(const Material& material, uint64_t
 
 }  // namespace
 
-Result<std::vector<PlacedMaterial>> storeImages(std::span<const Material> materials, const ImageQuality& quality,
+Result<std::vector<PlacedMaterial>> storeImages(std::span<const Material> materials, const BuildOptions& options,
                                                 uint64_t imageBytes, PageSpool& spool,
+                                                std::vector<std::string>& warnings,
                                                 const std::function<bool(double)>& progress) {
     std::vector<PlacedMaterial> placed(materials.size());
     std::map<ImageKey, std::optional<uint32_t>> numbers;  // nothing: it cannot be read
@@ -104,11 +121,14 @@ Result<std::vector<PlacedMaterial>> storeImages(std::span<const Material> materi
         const auto [number, isNew] = numbers.try_emplace(keyOf(material.image));
         if (isNew) {
             if (!progress(double(i) / double(materials.size()))) return Error::cancelled();
-            VCP_TRY_ASSIGN(const auto source, loadSource(material, imageBytes));
-            if (!source) continue;
-            const glm::uvec2 size = source->texture.size();
+            const auto loaded = loadSource(material, options.imageQuality.finest != 0, imageBytes);
+            if (!loaded && options.keepImages) return loaded.error();
+            if (!loaded) warnings.push_back(loaded.error().line() + "; it is left out");
+            if (!loaded || !*loaded) continue;
+            const SourceImage& source = **loaded;
+            const glm::uvec2 size = source.texture.size();
             const auto levels = imageLevels(size.x, size.y, tiles, kLargeTileEdge);
-            VCP_TRY(appendTiles(*source, levels, quality, imageBytes / 2, spool));
+            VCP_TRY(appendTiles(source.texture, levels, source.blocks.get(), options.imageQuality, spool));
             number->second = uint32_t(tables.images.size());
             tables.images.push_back({size.x, size.y, uint32_t(levels.size()), kMixedTiles, tiles});
             tiles += tilesOf(levels);
@@ -129,6 +149,21 @@ Result<std::vector<PlacedMaterial>> storeImages(std::span<const Material> materi
     stored.geometry.insert(stored.geometry.begin(), first.begin(), first.end());
     VCP_TRY(spool.append({}, stored));
     return placed;
+}
+
+uint64_t expectedImageBytes(std::span<const Material> materials) {
+    std::map<ImageKey, double> bytes;
+    for (const Material& material : materials) {
+        if (!material.image.exists()) continue;
+        std::error_code missing;
+        const auto size = material.image.bytes ? material.image.bytes->size()
+                                               : std::filesystem::file_size(material.image.path, missing);
+        const bool isPng = material.image.bytes ? material.image.bytes->starts_with("\x89PNG")
+                                                : material.image.path.extension() == ".png";
+        bytes[keyOf(material.image)] = missing ? 0 : (isPng ? kStoredOfPng : kStoredOfJpeg) * double(size);
+    }
+    return uint64_t(std::accumulate(bytes.begin(), bytes.end(), 0.0,
+                                    [](double sum, const auto& image) { return sum + image.second; }));
 }
 
 Result<ImageTables> storedTables(const PageSpool& spool) {

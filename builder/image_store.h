@@ -4,6 +4,7 @@
 
 #include <functional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "builder/build.h"
@@ -15,14 +16,19 @@
 
 namespace vcp {
 
-/// Codes the images of `materials`, each once however many have it, and appends their tiles to `spool`, then their
-/// tables. `quality`: a tile whose bytes are fewer without loss, or that is not opaque, loses nothing. Images that
-/// cannot be read are left out; whoever takes colours from them says so. `imageBytes`: memory for one image and its
-/// levels. `progress` is given the part done; false cancels. Returns what the file has of each material. Uses the
-/// calling arena's threads. Errors: Limit (an image needs more memory), Io, Cancelled.
-Result<std::vector<PlacedMaterial>> storeImages(std::span<const Material> materials, const ImageQuality& quality,
+/// Codes the images of `materials`, each once however many have it, as options.imageQuality says, and appends their
+/// tiles to `spool`, then their tables. A tile that is not opaque, or has fewer bytes without loss, loses nothing.
+/// Images that cannot be read are left out; whoever takes colours from them says so. `imageBytes`: memory for one image
+/// and its levels; one that needs more becomes a warning, and is left out, too, unless images are asked for.
+/// `progress` is given the part done; false cancels. Returns what the file has of each material. Uses the calling
+/// arena's threads. Errors: Limit (an image needs more memory), Io, Cancelled.
+Result<std::vector<PlacedMaterial>> storeImages(std::span<const Material> materials, const BuildOptions& options,
                                                 uint64_t imageBytes, PageSpool& spool,
+                                                std::vector<std::string>& warnings,
                                                 const std::function<bool(double)>& progress);
+
+/// Returns about how many bytes images of such materials take in a file, by the sizes of theirs; without reading them.
+uint64_t expectedImageBytes(std::span<const Material> materials);
 
 /// Returns the tables of the images in a spool, without the tiles' offsets; empty where there are none. The tiles are
 /// its first entries. Errors: Io, InvalidInput (damaged).

@@ -55,7 +55,7 @@ uint64_t defaultMemoryBytes() {
 
 uint64_t fixedMemoryBytes(unsigned threads) { return kBaseBytes + threads * kThreadBytes; }
 
-Result<MemoryPlan> planMemory(uint64_t memoryBytes, unsigned threads, bool withImages) {
+Result<MemoryPlan> planMemory(uint64_t memoryBytes, unsigned threads) {
     const uint64_t fixed = fixedMemoryBytes(threads);
     if (memoryBytes < fixed + kLeastUsable)
         return Error{
@@ -71,8 +71,12 @@ Result<MemoryPlan> planMemory(uint64_t memoryBytes, unsigned threads, bool withI
     plan.bufferBytes = usable / 16;
     // Pages get what temporary files, the next level's blocks and those of waiting triangles leave.
     plan.pageBytes = usable - plan.tempBytes - plan.bufferBytes * 5 / 4;
-    plan.binTriangles = usable / 3 / (kBinTriangleBytes + (withImages ? kTextureBytes : 0));
+    plan.binBytes = usable / 3;
     return plan;
+}
+
+uint64_t MemoryPlan::binTriangles(bool withImages) const {
+    return binBytes / (kBinTriangleBytes + (withImages ? kTextureBytes : 0));
 }
 
 uint64_t MemoryPlan::mostCountedPages() const { return pageBytes / kCountedPageBytes; }

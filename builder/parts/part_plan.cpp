@@ -52,7 +52,7 @@ json jsonOf(const PartPlan& plan) {
             {"inputs", inputs},         {"output", o.output.string()},
             {"overwrite", o.overwrite}, {"format", o.format},
             {"cell", o.cell},           {"colour", int(o.colour)},
-            {"images", o.keepImages},   {"image_quality", {o.imageQuality.finest.value_or(-1), o.imageQuality.coarser}},
+            {"images", keepsImages(o)},   {"image_quality", {o.imageQuality.finest.value_or(-1), o.imageQuality.coarser}},
             {"memory", o.memoryBytes},  {"vertex_normals", int(o.vertexNormals)}};
 }
 

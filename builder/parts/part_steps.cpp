@@ -240,7 +240,7 @@ Result<PartContext> openContext(const std::filesystem::path& folder, const PartP
     levels.finest = PagePartition(recorded.partition);
     context.threads = threadsOf(plan.options);
     const uint64_t memory = plan.options.memoryBytes > 0 ? plan.options.memoryBytes : defaultMemoryBytes();
-    VCP_TRY_ASSIGN(context.memory, planMemory(memory, context.threads, plan.options.keepImages));
+    VCP_TRY_ASSIGN(context.memory, planMemory(memory, context.threads));
     VCP_TRY_ASSIGN(context.memory, planPages(context.memory, recorded.pages, levels.finest.bins()));
     levels.pageBytes = context.memory.pageBytes;
     context.hasColour = colourUseOf(plan.options, recorded.measures).any();

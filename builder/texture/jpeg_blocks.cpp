@@ -1,7 +1,7 @@
 #include "builder/texture/jpeg_blocks.h"
 
 #include <algorithm>
-#include <cstdlib>
+#include <cassert>
 #include <cstring>
 #include <mutex>
 
@@ -15,22 +15,24 @@ namespace {
 /// libjpeg back into them.
 class TileWriter {
 public:
-    TileWriter() { jpeg_.err = &failure_.base; }
-    ~TileWriter() {
-        jpeg_destroy_compress(&jpeg_);
-        std::free(bytes_);
-    }
+    explicit TileWriter(glm::uvec2 size) : size_(size), bytes_(size) { jpeg_.err = &failure_.base; }
+    ~TileWriter() { jpeg_destroy_compress(&jpeg_); }
     TileWriter(const TileWriter&) = delete;
     TileWriter& operator=(const TileWriter&) = delete;
 
     /// Makes room for the blocks of a tile of a picture, and takes them. `corner`: of the tile, in texels.
-    bool take(jpeg_decompress_struct& picture, jvirt_barray_ptr* blocks, glm::uvec2 corner, glm::uvec2 size) {
+    bool take(jpeg_decompress_struct& picture, jvirt_barray_ptr* blocks, glm::uvec2 corner) {
         if (setjmp(failure_.back)) return false;
+        picture.err = &failure_.base;
         jpeg_create_compress(&jpeg_);
-        jpeg_mem_dest(&jpeg_, &bytes_, &count_);
+        bytes_.receive(jpeg_);
         jpeg_copy_critical_parameters(&picture, &jpeg_);
-        jpeg_.image_width = size.x;
-        jpeg_.image_height = size.y;
+        jpeg_.image_width = size_.x;
+        jpeg_.image_height = size_.y;
+#if JPEG_LIB_VERSION >= 70
+        jpeg_.jpeg_width = size_.x;
+        jpeg_.jpeg_height = size_.y;
+#endif
         jpeg_.optimize_coding = TRUE;
         for (int c = 0; c < picture.num_components; ++c) {
             const jpeg_component_info& from = picture.comp_info[c];
@@ -38,8 +40,8 @@ public:
                 return (texels * uint32_t(factor) + uint32_t(most) * DCTSIZE - 1) / (uint32_t(most) * DCTSIZE);
             };
             const auto height = uint32_t(from.v_samp_factor);
-            width_[c] = blocksOf(size.x, from.h_samp_factor, picture.max_h_samp_factor);
-            height_[c] = blocksOf(size.y, from.v_samp_factor, picture.max_v_samp_factor);
+            width_[c] = blocksOf(size_.x, from.h_samp_factor, picture.max_h_samp_factor);
+            height_[c] = blocksOf(size_.y, from.v_samp_factor, picture.max_v_samp_factor);
             blocks_[c] = jpeg_.mem->request_virt_barray(reinterpret_cast<j_common_ptr>(&jpeg_), JPOOL_IMAGE, TRUE,
                                                         width_[c], (height_[c] + height - 1) / height * height, height);
         }
@@ -66,16 +68,13 @@ public:
         return true;
     }
 
-    [[nodiscard]] std::vector<std::byte> bytes() const {
-        const auto* const first = reinterpret_cast<const std::byte*>(bytes_);
-        return {first, first + count_};
-    }
+    [[nodiscard]] std::vector<std::byte> bytes() const { return bytes_.written(); }
 
 private:
+    glm::uvec2 size_;
+    JpegBytes bytes_;
     jpeg_compress_struct jpeg_{};
     JpegFailure failure_;
-    unsigned char* bytes_ = nullptr;
-    unsigned long count_ = 0;
     jvirt_barray_ptr blocks_[MAX_COMPONENTS] = {};
     uint32_t width_[MAX_COMPONENTS] = {}, height_[MAX_COMPONENTS] = {};  // in blocks
 };
@@ -86,23 +85,30 @@ public:
     ~Blocks() override { jpeg_destroy_decompress(&jpeg_); }
 
     /// Returns whether it has the blocks.
-    bool read(const std::string& file, uint64_t memoryBytes) {
+    bool read(const std::string& file) {
         if (setjmp(failure_.back)) return false;
         jpeg_create_decompress(&jpeg_);
+        jpeg_.mem->max_memory_to_use = 0;  // whatever the environment says
         jpeg_mem_src(&jpeg_, reinterpret_cast<const unsigned char*>(file.data()),
                      static_cast<unsigned long>(file.size()));
         jpeg_read_header(&jpeg_, TRUE);
-        if (!canBeCut() || bytesOfBlocks() > memoryBytes) return false;
+        if (!canBeCut()) return false;
         blocks_ = jpeg_read_coefficients(&jpeg_);
-        return true;
+        return isComplete();
     }
 
     [[nodiscard]] std::vector<std::byte> tile(const ImageLevel& level, glm::uvec2 tile) const override {
-        TileWriter writer;
+        assert(level.width == jpeg_.image_width && level.height == jpeg_.image_height);
+        const glm::uvec2 size = level.sizeOf(tile);
+        // Of so few columns, halved colours are not blended.
+        if (size.x <= 4 && size.x < level.width) return {};
+        TileWriter writer(size);
         {
-            // libjpeg notes what was asked for.
+            // libjpeg notes what was asked for, and whom to tell of errors.
             const std::scoped_lock lock(mutex_);
-            if (!writer.take(jpeg_, blocks_, tile * level.tileEdge, level.sizeOf(tile))) return {};
+            const bool isTaken = writer.take(jpeg_, blocks_, tile * level.tileEdge);
+            jpeg_.err = &failure_.base;
+            if (!isTaken) return {};
         }
         return writer.write() ? writer.bytes() : std::vector<std::byte>();
     }
@@ -128,22 +134,27 @@ private:
         for (int c = 0; c < jpeg_.num_components; ++c) most = std::max(most, jpeg_.comp_info[c].*factor);
         return most;
     }
-    [[nodiscard]] uint64_t bytesOfBlocks() const {
-        return uint64_t{jpeg_.image_width} * jpeg_.image_height * uint64_t(jpeg_.num_components) * sizeof(JCOEF);
+    /// Whether all bits of all coefficients came. What lacks some is smoothed where it is decoded as a whole.
+    [[nodiscard]] bool isComplete() const {
+        if (jpeg_.coef_bits == nullptr) return true;
+        for (int c = 0; c < jpeg_.num_components; ++c)
+            if (!std::all_of(jpeg_.coef_bits[c], jpeg_.coef_bits[c] + DCTSIZE2, [](int bits) { return bits == 0; }))
+                return false;
+        return true;
     }
 
     mutable jpeg_decompress_struct jpeg_{};
+    mutable JpegFailure failure_;
     mutable std::mutex mutex_;
-    JpegFailure failure_;
     jvirt_barray_ptr* blocks_ = nullptr;
 };
 
 }  // namespace
 
-std::unique_ptr<JpegBlocks> JpegBlocks::read(const std::string& file, uint64_t memoryBytes) {
+std::unique_ptr<JpegBlocks> JpegBlocks::read(const std::string& file) {
     if (!file.starts_with("\xFF\xD8")) return nullptr;
     auto blocks = std::make_unique<Blocks>();
-    if (!blocks->read(file, memoryBytes)) return nullptr;
+    if (!blocks->read(file)) return nullptr;
     return blocks;
 }
 

@@ -1,5 +1,6 @@
 // The blocks of a JPEG picture, cut into tiles that are JPEGs of their own, without decoding them to texels: no tile
-// differs from the picture, but for colours beside a tile's edge, where the picture has fewer of them than of light.
+// differs from the picture, but for the colours of its outermost texels, where the picture has fewer of them than of
+// light.
 #pragma once
 
 #include <cstddef>
@@ -16,12 +17,13 @@ namespace vcp {
 
 class JpegBlocks {
 public:
-    /// Reads the blocks of a picture into at most about `memoryBytes`. `file` is the whole file, which was decoded
-    /// before. Returns nothing where it is no JPEG, its blocks cannot be cut, or the memory is too little.
-    static std::unique_ptr<JpegBlocks> read(const std::string& file, uint64_t memoryBytes);
+    /// Reads the blocks of a picture, which take up to 6 bytes a texel. `file` is the whole file, which was decoded
+    /// before. Returns nothing where it is no JPEG, or its blocks cannot be cut.
+    static std::unique_ptr<JpegBlocks> read(const std::string& file);
     virtual ~JpegBlocks() = default;
 
-    /// Returns a tile of the picture's finest level; empty where there is no memory. Any thread.
+    /// Returns a tile of the picture's finest level; empty where it would show other colours, or there is no memory.
+    /// Precondition: the level has the picture's size. Any thread.
     [[nodiscard]] virtual std::vector<std::byte> tile(const ImageLevel& level, glm::uvec2 tile) const = 0;
 };
 

@@ -91,7 +91,8 @@ Result<std::vector<uint32_t>> ImagePieces::readPiece(const ByteReader& reader, u
     for (uint64_t i = 0; i < piece.tiles; ++i) {
         const glm::uvec2 size = sizeOf(piece, i);
         const size_t count = size_t{size.x} * size.y;
-        VCP_TRY(decodeTile(reader.name(), tables_, stored, piece.firstTile + i, size, rest.first(count)));
+        VCP_TRY(decodeTile(reader.name(), tables_, tables_.images[piece.image], stored, piece.firstTile + i, size,
+                           rest.first(count)));
         rest = rest.subspan(count);
     }
     return texels;

@@ -150,15 +150,16 @@ Result<StoredTiles> readTiles(const ByteReader& reader, const ImageTables& table
     return tiles;
 }
 
-Result<void> decodeTile(const std::string& file, const ImageTables& tables, const StoredTiles& tiles, uint64_t number,
-                        glm::uvec2 size, std::span<uint32_t> texels) {
+Result<void> decodeTile(const std::string& file, const ImageTables& tables, const ImageRow& image,
+                        const StoredTiles& tiles, uint64_t number, glm::uvec2 size, std::span<uint32_t> texels) {
     const TileRow& row = tables.tiles[number];
     const auto bytes = std::span(tiles.bytes).subspan(row.offset - tables.tiles[tiles.first].offset, row.storedBytes);
     const auto fail = [&](std::string message) {
         return brokenBytes(file, fmt::format("tile {}", number), row.offset, std::move(message));
     };
     if (hashBytes(bytes) != row.hash) return fail("its hash does not match: the file was changed or damaged");
-    const auto done = isJpeg(bytes) ? unpackJpeg(bytes, size, texels) : unpackTile(bytes, size, texels);
+    const bool mayBeJpeg = image.coding == kMixedTiles;
+    const auto done = mayBeJpeg && isJpeg(bytes) ? unpackJpeg(bytes, size, texels) : unpackTile(bytes, size, texels);
     if (!done) return fail(done.error().message);
     return {};
 }
@@ -172,7 +173,7 @@ Result<void> verifyImages(const ByteReader& reader, const ImagesPlace& place,
             uint64_t number = level.firstTile;
             for (const glm::uvec2 tile : tileOrder(level)) {
                 VCP_TRY_ASSIGN(const auto stored, readTiles(reader, tables, number, 1));
-                VCP_TRY(decodeTile(reader.name(), tables, stored, number, level.sizeOf(tile), texels));
+                VCP_TRY(decodeTile(reader.name(), tables, image, stored, number, level.sizeOf(tile), texels));
                 const TileRow& row = tables.tiles[number++];
                 if (!progress(row.offset + row.storedBytes)) return Error::cancelled(reader.name());
             }

@@ -89,10 +89,11 @@ struct StoredTiles {
 };
 Result<StoredTiles> readTiles(const ByteReader& reader, const ImageTables& tables, uint64_t first, uint64_t count);
 
-/// Checks the hash of one of the tiles that were read, and decodes it. `file`: its name, for errors; `number`: in the
-/// table; `size`: its texels along both axes; `texels`: room for them. Errors: InvalidInput. Any thread.
-Result<void> decodeTile(const std::string& file, const ImageTables& tables, const StoredTiles& tiles, uint64_t number,
-                        glm::uvec2 size, std::span<uint32_t> texels);
+/// Checks the hash of one of the tiles of `image` that were read, and decodes it. `file`: its name, for errors;
+/// `number`: in the table; `size`: its texels along both axes; `texels`: room for them. Errors: InvalidInput. Any
+/// thread.
+Result<void> decodeTile(const std::string& file, const ImageTables& tables, const ImageRow& image,
+                        const StoredTiles& tiles, uint64_t number, glm::uvec2 size, std::span<uint32_t> texels);
 
 /// Reads and checks the section: its tables, and each tile. `progress` is called with the bytes up to where the file is
 /// checked; false cancels. Errors: InvalidInput, Io, Cancelled.

@@ -1,5 +1,7 @@
 #include "octree/image/jpeg_failure.h"
 
+#include <cstdlib>
+
 namespace vcp {
 
 extern "C" {
@@ -20,6 +22,21 @@ JpegFailure::JpegFailure() {
     base.error_exit = vcpJpegFailed;
     base.emit_message = vcpJpegWarned;
     base.output_message = vcpJpegSilent;
+}
+
+// Three channels of at most 4 bytes a texel, their last blocks, and the tables.
+JpegBytes::JpegBytes(glm::uvec2 size)
+    : room_(size_t{12} * (size.x + 32) * (size.y + 32) + 4096), first_(room_.data()), count_(room_.size()) {}
+
+JpegBytes::~JpegBytes() {
+    if (first_ != room_.data()) std::free(first_);
+}
+
+void JpegBytes::receive(jpeg_compress_struct& jpeg) { jpeg_mem_dest(&jpeg, &first_, &count_); }
+
+std::vector<std::byte> JpegBytes::written() const {
+    const auto* const first = reinterpret_cast<const std::byte*>(first_);
+    return {first, first + count_};
 }
 
 }  // namespace vcp

@@ -1,4 +1,4 @@
-// What libjpeg says of a file that it cannot read: it reports an error by a call that must not return.
+// What libjpeg says where it fails, which is a call that must not return, and where it writes to.
 //
 //   JpegFailure failure;
 //   jpeg.err = &failure.base;
@@ -6,7 +6,11 @@
 #pragma once
 
 #include <csetjmp>
+#include <cstddef>
 #include <cstdio>
+#include <vector>
+
+#include <glm/vec2.hpp>
 
 // This header needs the one before it.
 #include <jpeglib.h>
@@ -19,6 +23,25 @@ struct JpegFailure {
     jpeg_error_mgr base{};  // it comes first: libjpeg's calls bring its address
     std::jmp_buf back;
     char message[JMSG_LENGTH_MAX] = {};
+};
+
+/// The bytes of a tile's JPEG while they are written.
+class JpegBytes {
+public:
+    /// Has room for what any tile of that size takes; libjpeg takes memory of its own where it takes more.
+    explicit JpegBytes(glm::uvec2 size);
+    ~JpegBytes();
+    JpegBytes(const JpegBytes&) = delete;
+    JpegBytes& operator=(const JpegBytes&) = delete;
+
+    void receive(jpeg_compress_struct& jpeg);
+    /// Returns them, once libjpeg has finished.
+    [[nodiscard]] std::vector<std::byte> written() const;
+
+private:
+    std::vector<unsigned char> room_;
+    unsigned char* first_;
+    unsigned long count_;
 };
 
 }  // namespace vcp

@@ -1,7 +1,5 @@
 #include "octree/image/jpeg_tile.h"
 
-#include <cstdlib>
-
 #include "octree/image/jpeg_failure.h"
 
 namespace vcp {
@@ -20,7 +18,7 @@ bool decode(jpeg_decompress_struct& jpeg, JpegFailure& failure, std::span<const 
     const bool isTile = jpeg.image_width == size.x && jpeg.image_height == size.y &&
                         (jpeg.jpeg_color_space == JCS_YCbCr || jpeg.jpeg_color_space == JCS_GRAYSCALE);
     // Several scans would be kept as a whole, and each goes over the whole tile.
-    if (!isTile || jpeg_has_multiple_scans(&jpeg)) return false;
+    if (!isTile || jpeg_has_multiple_scans(&jpeg) || jpeg.arith_code) return false;
     jpeg.out_color_space = JCS_EXT_RGBA;
     jpeg_start_decompress(&jpeg);
     while (jpeg.output_scanline < jpeg.output_height) {
@@ -32,10 +30,10 @@ bool decode(jpeg_decompress_struct& jpeg, JpegFailure& failure, std::span<const 
 }
 
 bool encode(jpeg_compress_struct& jpeg, JpegFailure& failure, std::span<const uint32_t> texels, glm::uvec2 size,
-            int quality, unsigned char*& bytes, unsigned long& count) {
+            int quality, JpegBytes& bytes) {
     if (setjmp(failure.back)) return false;
     jpeg_create_compress(&jpeg);
-    jpeg_mem_dest(&jpeg, &bytes, &count);
+    bytes.receive(jpeg);
     jpeg.image_width = size.x;
     jpeg.image_height = size.y;
     jpeg.input_components = 4;
@@ -60,16 +58,11 @@ Result<std::vector<std::byte>> packJpeg(std::span<const uint32_t> texels, glm::u
     jpeg_compress_struct jpeg{};
     JpegFailure failure;
     jpeg.err = &failure.base;
-    unsigned char* bytes = nullptr;
-    unsigned long count = 0;
-    const bool done = encode(jpeg, failure, texels, size, quality, bytes, count);
+    JpegBytes bytes(size);
+    const bool done = encode(jpeg, failure, texels, size, quality, bytes);
     jpeg_destroy_compress(&jpeg);
-    const auto* const first = reinterpret_cast<const std::byte*>(bytes);
-    std::vector<std::byte> packed;
-    if (done) packed.assign(first, first + count);
-    std::free(bytes);
     if (!done) return Error{.code = ErrorCode::Limit, .message = failure.message};
-    return packed;
+    return bytes.written();
 }
 
 Result<void> unpackJpeg(std::span<const std::byte> packed, glm::uvec2 size, std::span<uint32_t> texels) {

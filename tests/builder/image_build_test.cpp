@@ -136,11 +136,17 @@ TEST_F(ImageBuild, IsTheSameHoweverItIsBuilt) {
 }
 
 TEST_F(ImageBuild, IsResumedAndBuiltInParts) {
-    const std::string whole = built(options());
+    const auto noise = [](uint32_t x, uint32_t y) { return (x * 2654435761u ^ y * 2246822519u) >> 5 & 0xffffffu; };
+    TexturedWalls::write(folder_.path(), noise, noise);
+    const std::string usual = built(options());
+    BuildOptions coarse = options();
+    coarse.imageQuality = {.finest = 3, .coarser = 3};
+    const std::string whole = built(coarse);
+    ASSERT_NE(whole.size(), usual.size());
     for (const std::string stage : {"level", "writing"}) {
         SCOPED_TRACE(stage);
         fs::remove(output());
-        BuildOptions o = options();
+        BuildOptions o = coarse;
         o.checkpointSeconds = 0;
         o.resume = true;
         bool stop = true;
@@ -149,10 +155,15 @@ TEST_F(ImageBuild, IsResumedAndBuiltInParts) {
         ASSERT_FALSE(stopped.ok());
         EXPECT_NE(stopped.error().line().find("resumed"), std::string::npos) << stopped.error().line();
         stop = false;
+        BuildOptions other = o;
+        other.imageQuality = {};
+        const auto refused = buildOctree(other);
+        ASSERT_FALSE(refused.ok());
+        EXPECT_NE(refused.error().line().find("other inputs or options"), std::string::npos) << refused.error().line();
         EXPECT_TRUE(built(o) == whole);
     }
     fs::remove(output());
-    BuildOptions o = options();
+    BuildOptions o = coarse;
     o.overwrite = false;
     ASSERT_NO_FATAL_FAILURE(test::buildInParts(o, 3));
     EXPECT_TRUE(contentOf(output()) == whole);
@@ -241,6 +252,34 @@ TEST_F(ImageBuild, AToleranceHasNoPlaceForImages) {
     const auto report = buildOctree(o);
     ASSERT_FALSE(report.ok());
     EXPECT_EQ(report.error().code, ErrorCode::Usage);
+    // Where nobody asks for them, none are kept.
+    o.keepImages.reset();
+    ASSERT_FALSE(built(o).empty());
+    EXPECT_FALSE(readDataset(**openFile(output()))->hasImages());
+}
+
+// What nobody asks for is kept where there is room.
+TEST_F(ImageBuild, ImagesTooLargeForTheMemoryAreLeftOut) {
+    BuildOptions o = options();
+    o.keepImages.reset();
+    const std::string whole = built(o);
+    EXPECT_TRUE(whole == built(options()));
+    Image large{3400, 3400, {}};
+    large.texels.assign(size_t{large.width} * large.height, 0xff8090a0u);
+    std::ofstream(folder_ / "floor.png", std::ios::binary) << test::jpegOf(large);
+    o.memoryBytes = uint64_t{200} << 20;
+    const auto report = buildOctree(o);
+    ASSERT_TRUE(report.ok()) << report.error().line();
+    ASSERT_EQ(report->warnings.size(), 1u);
+    EXPECT_NE(report->warnings[0].find("let the memory cap be larger; it is left out"), std::string::npos)
+        << report->warnings[0];
+    EXPECT_EQ(readDataset(**openFile(output()))->header.images.images, 1u);
+    o.keepImages = true;
+    const auto refused = buildOctree(o);
+    ASSERT_FALSE(refused.ok());
+    EXPECT_EQ(refused.error().code, ErrorCode::Limit);
+    o.memoryBytes = uint64_t{600} << 20;
+    EXPECT_TRUE(buildOctree(o).ok());
 }
 
 }  // namespace

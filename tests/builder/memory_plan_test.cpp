@@ -17,7 +17,8 @@ TEST(MemoryPlan, SharesFitTheCap) {
             // While reading; while stepping or building pages: with the blocks of the next level and of what waits.
             EXPECT_LE(plan->vertexBytes + plan->tempBytes + plan->bufferBytes, cap);
             EXPECT_LE(plan->pageBytes + plan->tempBytes + plan->bufferBytes + plan->bufferBytes / 4, cap);
-            EXPECT_LE(plan->binTriangles * 260 + plan->tempBytes + plan->bufferBytes + plan->bufferBytes / 4, cap);
+            EXPECT_LE(plan->binTriangles(false) * 260 + plan->tempBytes + plan->bufferBytes + plan->bufferBytes / 4,
+                      cap);
             for (const uint64_t share : {plan->vertexBytes, plan->tempBytes, plan->bufferBytes, plan->pageBytes})
                 EXPECT_GT(share, cap / 40);
         }
@@ -29,7 +30,7 @@ TEST(MemoryPlan, MoreMemoryNeverMakesLess) {
         const auto plan = planMemory(megabytes * kMebibyte, 2);
         ASSERT_TRUE(plan.ok());
         EXPECT_GE(plan->vertexBytes, last.vertexBytes);
-        EXPECT_GE(plan->binTriangles, last.binTriangles);
+        EXPECT_GE(plan->binTriangles(false), last.binTriangles(false));
         EXPECT_GE(plan->pageBytes, last.pageBytes);
         last = *plan;
     }
@@ -54,10 +55,10 @@ TEST(MemoryPlan, TenBillionTrianglesFitOneGibibyte) {
     for (const auto& [megabytes, triangles] : {std::pair(150, 1e9), std::pair(1024, 1e10)}) {
         const auto plan = planMemory(uint64_t(megabytes) * kMebibyte, 2);
         ASSERT_TRUE(plan.ok());
-        const auto bins = uint64_t(1.5 * triangles / double(plan->binTriangles));
+        const auto bins = uint64_t(1.5 * triangles / double(plan->binTriangles(false)));
         const auto planned = planPages(*plan, uint64_t(triangles / 8000), bins);
         ASSERT_TRUE(planned.ok()) << planned.error().line();
-        EXPECT_GE(planned->pageBytes, plan->binTriangles * 260);
+        EXPECT_GE(planned->pageBytes, plan->binTriangles(false) * 260);
         EXPECT_LT(planned->pageBytes, plan->pageBytes);
         EXPECT_GE(plan->mostCountedPages(), uint64_t(triangles / 8000));
     }
@@ -80,7 +81,9 @@ TEST(MemoryPlan, TooManyPagesOrBinsSayWhatIsEnough) {
     const auto more = planMemory(enough(bins.error()) * kMebibyte, 2);
     ASSERT_TRUE(more.ok());
     // Bins are as many as are needed for the triangles.
-    EXPECT_TRUE(planPages(*more, 1, uint64_t(1e6 * double(plan->binTriangles) / double(more->binTriangles))).ok());
+    EXPECT_TRUE(
+        planPages(*more, 1, uint64_t(1e6 * double(plan->binTriangles(false)) / double(more->binTriangles(false))))
+            .ok());
 }
 
 TEST(MemoryPlan, DefaultIsPartOfTheMachine) { EXPECT_GT(defaultMemoryBytes(), 64 * kMebibyte); }

@@ -19,7 +19,7 @@ void decodeTiles(const uint8_t* data, size_t size) {
 
 /// What is cut out of a picture that can be decoded can be decoded, too.
 void cutTiles(const std::string& file, glm::uvec2 size) {
-    const auto blocks = vcp::JpegBlocks::read(file, 1 << 24);
+    const auto blocks = vcp::JpegBlocks::read(file);
     if (!blocks) return;
     const vcp::ImageLevel level{size.x, size.y, 0, vcp::kLargeTileEdge};
     for (const glm::uvec2 place : vcp::tileOrder(level)) {

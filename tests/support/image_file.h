@@ -34,18 +34,18 @@ struct StoredImages {
     ImageTables tables;
     std::vector<std::vector<std::byte>> tiles;
 
-    void add(const LevelledImage& image) {
-        const auto levels = imageLevels(image.width, image.height, tables.tiles.size());
+    void add(const LevelledImage& image, uint32_t coding = kLosslessTiles) {
         tables.images.push_back(
-            {image.width, image.height, uint32_t(levels.size()), kLosslessTiles, tables.tiles.size()});
+            {image.width, image.height, uint32_t(image.levels.size()), coding, tables.tiles.size()});
+        const auto levels = levelsOf(tables.images.back());
         for (size_t l = levels.size(); l-- > 0;)
             for (const glm::uvec2 tile : tileOrder(levels[l])) {
                 const glm::uvec2 size = levels[l].sizeOf(tile);
                 std::vector<uint32_t> texels;
                 for (uint32_t y = 0; y < size.y; ++y)
                     for (uint32_t x = 0; x < size.x; ++x)
-                        texels.push_back(image.levels[l][size_t{tile.y * kImageTileEdge + y} * levels[l].width +
-                                                         tile.x * kImageTileEdge + x]);
+                        texels.push_back(image.levels[l][size_t{tile.y * levels[l].tileEdge + y} * levels[l].width +
+                                                         tile.x * levels[l].tileEdge + x]);
                 tiles.push_back(packTile(texels, size));
                 tables.tiles.push_back({0, hashBytes(tiles.back()), uint32_t(tiles.back().size()), 0});
             }

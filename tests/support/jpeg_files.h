@@ -14,7 +14,8 @@ namespace vcp::test {
 
 struct JpegKind {
     bool progressive = false;
-    bool isGrey = false;
+    J_COLOR_SPACE colours = JCS_YCbCr;
+    bool isArithmetic = false;
     int quality = 95;
     int sampling[2] = {2, 2};                ///< of light: along x and y, as often as of colour
     std::vector<jpeg_scan_info> scans = {};  ///< none: as the others say
@@ -33,10 +34,11 @@ inline std::string jpegOf(const Image& image, const JpegKind& kind = {}) {
     jpeg.input_components = 4;
     jpeg.in_color_space = JCS_EXT_RGBA;
     jpeg_set_defaults(&jpeg);
-    if (kind.isGrey) jpeg_set_colorspace(&jpeg, JCS_GRAYSCALE);
+    jpeg_set_colorspace(&jpeg, kind.colours);
     jpeg_set_quality(&jpeg, kind.quality, TRUE);
     jpeg.comp_info[0].h_samp_factor = kind.sampling[0];
     jpeg.comp_info[0].v_samp_factor = kind.sampling[1];
+    jpeg.arith_code = kind.isArithmetic ? TRUE : FALSE;
     if (kind.progressive) jpeg_simple_progression(&jpeg);
     if (!kind.scans.empty()) {
         jpeg.scan_info = kind.scans.data();

@@ -101,15 +101,15 @@ void addColourChoice(CLI::App& app, BuildOptions& options) {
 }
 
 void addImages(CLI::App& app, BuildOptions& options) {
-    app.add_flag("--images", options.keepImages,
-                 "Keep the images of materials, too, as sharp as they are, with their place on the triangles; browsers "
-                 "do not draw from them yet");
-    addParsed(
-        app, "--colour-quality,--color-quality", options.imageQuality, imageQualityNamed,
-        "source, lossless or 1 to 100",
-        "How --images codes them: source (the finest level as the mesh brings it: a JPEG's own blocks, and without "
-        "loss what is PNG; coarser ones as JPEGs of quality 90), lossless, or all as JPEGs of a quality of 1 to "
-        "100")
+    app.add_flag_function(
+        "--images,!--no-images", [&options](int64_t times) { options.keepImages = times > 0; },
+        "Keep the images of materials, too, as sharp as they are, with their place on the triangles; browsers "
+        "do not draw from them yet [on, but with --error]");
+    addParsed(app, "--colour-quality,--color-quality", options.imageQuality, imageQualityNamed,
+              "source, lossless or 1 to 100",
+              "How images are coded: source (the finest level as the mesh brings it: a JPEG's own blocks, and without "
+              "loss what is PNG; coarser ones as JPEGs of quality 90), lossless, or all as JPEGs of a quality of 1 to "
+              "100 where these are smaller")
         ->type_name("source|lossless|N")
         ->default_str("source");
 }

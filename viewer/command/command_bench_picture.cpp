@@ -104,7 +104,7 @@ RunCommand addBenchColour(CLI::App& bench) {
     addNames(*app, "--cameras", options.cameras, fmt::format("{} [all]", fmt::join(colourCameraNames(), ", ")));
     addPictureOptions(*app, options, command->size);
     addNumber(*app, "--picture-samples", options.pictureSamples, "All pictures compared have N x N rays a pixel", 8);
-    app->add_flag("--images", options.images, "Build with `vcp build --images`, and draw from them");
+    app->add_flag("--images,!--no-images", options.images, "Keep images in what is built, and draw from them [on]");
     app->add_flag("--pictures", options.pictures, "Also write the pictures into --out");
     return [command] { return runColour(*command); };
 }

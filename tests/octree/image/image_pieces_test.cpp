@@ -22,6 +22,8 @@ protected:
             images_.push_back(test::randomImage(width, height, width));
         test::StoredImages stored;
         for (const test::LevelledImage& image : images_) stored.add(image);
+        images_.push_back(test::randomImage(1100, 700, 4));
+        stored.add(images_.back(), kMixedTiles);
         stored.tables.materials = {{}};
         test::writeImageFile(folder_ / "images.vcp", stored);
         file_ = *openFile(folder_ / "images.vcp");
@@ -69,6 +71,11 @@ TEST_F(Pieces, EachTileIsInOne) {
     EXPECT_EQ(pieces_->piecesOf(0, 10).first, 0u);
     EXPECT_EQ(pieces_->firstLevel(1), 1u);
     EXPECT_EQ(pieces_->firstLevel(2), 0u);
+    // Of larger tiles 5 x 3, then 3 x 2; then 275 x 175, which is two tiles, and below it a tile each.
+    EXPECT_EQ(pieces_->piecesOf(3, 0).end - pieces_->piecesOf(3, 0).first, 4u);
+    EXPECT_EQ(pieces_->piecesOf(3, 1).end - pieces_->piecesOf(3, 1).first, 2u);
+    EXPECT_EQ(pieces_->piecesOf(3, 3).end - pieces_->piecesOf(3, 3).first, 1u);
+    EXPECT_EQ(pieces_->firstLevel(3), 5u);
 }
 
 TEST_F(Pieces, AreWholeLevelsInAnyOrder) {

@@ -62,7 +62,7 @@ protected:
     void SetUp() override {
         for (const auto& [width, height] : {std::pair(5u, 3u), std::pair(70u, 2u), std::pair(1u, 1u)})
             images_.push_back(test::randomImage(width, height, width));
-        for (const LevelledImage& image : images_) stored_.add(image);
+        for (const LevelledImage& image : images_) stored_.add(image, image.width == 70 ? kMixedTiles : kLosslessTiles);
         stored_.tables.materials = {{.image = 0},
                                     {.image = 2, .factor = 0xff102030, .wrapU = ImageWrap::Clamp},
                                     {.image = 1, .wrapV = ImageWrap::Mirror}};

@@ -35,7 +35,7 @@ struct BenchColourOptions {
     std::string device;         ///< device of `certified`, as for --device; empty: the best
     std::filesystem::path out;  ///< .vcp files are kept here and used again; empty: a temporary folder
     double cell = 0;            ///< as for vcp build
-    bool images = false;        ///< as for vcp build
+    bool images = true;         ///< as for vcp build
     bool pictures = false;      ///< also writes the pictures into `out`
     /// Called from one thread at a time with what is being done; false cancels. May be empty.
     std::function<bool(const std::string&, double fraction)> progress;
