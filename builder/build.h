@@ -9,8 +9,8 @@
 // What passes between them lies on temporary files (spill/), in memory while
 // there is room. A journal (checkpoint.h) says how far things are: after an interruption the build goes on
 // from there.
-// The output is the same bytes for any number of threads, any memory that each image fits, any order of the triangles and however
-// often the build was interrupted.
+// The output is the same bytes for any number of threads, any memory that each image fits, any order of the triangles
+// and however often the build was interrupted.
 #pragma once
 
 #include <cstdint>
@@ -53,7 +53,8 @@ struct BuildProgress {
 struct ImageQuality {
     /// Of the finest level; nothing: as the source has it, which is a JPEG's own blocks, and else without loss.
     std::optional<int> finest;
-    int coarser = 90;  ///< of the levels above it, which are means of light
+    /// Of the levels above it, which are means of light; nothing: what a source's JPEG has, 80 at least, and else 95.
+    std::optional<int> coarser;
 
     bool operator==(const ImageQuality&) const = default;
 };

@@ -196,7 +196,7 @@ std::string settingsText(const BuildOptions& options) {
     return fmt::format("{} {:a} {:a} {} {} {} {} {} {} {} {}", kFileVersion, options.cell, options.error,
                        options.errorIsRelative, int(options.colour), int(options.coarseLeaves), keepsImages(options),
                        keepsImages(options) ? options.imageQuality.finest.value_or(-1) : 0,
-                       keepsImages(options) ? options.imageQuality.coarser : 0, int(options.vertexNormals),
+                       keepsImages(options) ? options.imageQuality.coarser.value_or(-1) : 0, int(options.vertexNormals),
                        options.format);
 }
 

@@ -21,6 +21,8 @@ namespace {
 
 // Coordinates have so many bits more than tell texels apart.
 constexpr uint32_t kBitsBelowTexels = 5;
+// What levels above the finest are coded with, unless somebody says it.
+constexpr int kLeastQuality = 80, kBestQuality = 95;
 // Tiles that are coded before they are written.
 constexpr size_t kTilesAtOnce = 64;
 // What images take in a file, of what their own files take: JPEGs with their coarser levels, and PNGs.
@@ -65,6 +67,8 @@ std::vector<std::byte> packed(const Image& image, const ImageLevel& level, glm::
 /// Appends the tiles of an image, coarse levels first. `blocks`: of its JPEG; may be null.
 Result<void> appendTiles(const Texture& texture, const std::vector<ImageLevel>& levels, const JpegBlocks* blocks,
                          const ImageQuality& quality, PageSpool& spool) {
+    const int own = blocks != nullptr ? std::clamp(blocks->quality(), kLeastQuality, kBestQuality) : kBestQuality;
+    const int coarser = quality.coarser.value_or(own);
     for (size_t l = levels.size(); l-- > 0;) {
         const std::vector<glm::uvec2> order = tileOrder(levels[l]);
         const bool isFinest = l == 0;
@@ -73,7 +77,7 @@ Result<void> appendTiles(const Texture& texture, const std::vector<ImageLevel>& 
             tbb::parallel_for(size_t{0}, tiles.size(), [&](size_t i) {
                 tiles[i].geometry =
                     packed(texture.levels()[l], levels[l], order[first + i], isFinest ? blocks : nullptr,
-                           isFinest ? quality.finest.value_or(0) : quality.coarser);
+                           isFinest ? quality.finest.value_or(0) : coarser);
             });
             for (const StoredPage& tile : tiles) VCP_TRY(spool.append({}, tile));
         }

@@ -52,7 +52,7 @@ json jsonOf(const PartPlan& plan) {
             {"inputs", inputs},         {"output", o.output.string()},
             {"overwrite", o.overwrite}, {"format", o.format},
             {"cell", o.cell},           {"colour", int(o.colour)},
-            {"images", keepsImages(o)},   {"image_quality", {o.imageQuality.finest.value_or(-1), o.imageQuality.coarser}},
+            {"images", keepsImages(o)},   {"image_quality", {o.imageQuality.finest.value_or(-1), o.imageQuality.coarser.value_or(-1)}},
             {"memory", o.memoryBytes},  {"vertex_normals", int(o.vertexNormals)}};
 }
 
@@ -73,7 +73,7 @@ PartPlan planFrom(const json& j) {
     plan.options.keepImages = j.at("images").get<bool>();
     const auto quality = j.at("image_quality").get<std::array<int, 2>>();
     if (quality[0] >= 0) plan.options.imageQuality.finest = quality[0];
-    plan.options.imageQuality.coarser = quality[1];
+    if (quality[1] >= 0) plan.options.imageQuality.coarser = quality[1];
     plan.options.vertexNormals = VertexNormals(j.at("vertex_normals").get<int>());
     plan.options.memoryBytes = j.at("memory").get<uint64_t>();
     return plan;

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cassert>
 #include <cstring>
+#include <iterator>
 #include <mutex>
+#include <numeric>
 
 #include "octree/image/jpeg_failure.h"
 
@@ -79,6 +81,30 @@ private:
     uint32_t width_[MAX_COMPONENTS] = {}, height_[MAX_COMPONENTS] = {};  // in blocks
 };
 
+/// Returns the sum of a table's steps.
+uint32_t stepsOf(const JQUANT_TBL& table) {
+    return std::accumulate(std::begin(table.quantval), std::end(table.quantval), uint32_t{0});
+}
+
+/// Returns the highest quality whose steps of light are no smaller.
+int qualityOf(uint32_t steps) {
+    jpeg_compress_struct jpeg{};
+    JpegFailure failure;
+    jpeg.err = &failure.base;
+    if (setjmp(failure.back)) {
+        jpeg_destroy_compress(&jpeg);
+        return 1;
+    }
+    jpeg_create_compress(&jpeg);
+    int quality = 100;
+    for (; quality > 1; --quality) {
+        jpeg_set_quality(&jpeg, quality, TRUE);
+        if (stepsOf(*jpeg.quant_tbl_ptrs[0]) >= steps) break;
+    }
+    jpeg_destroy_compress(&jpeg);
+    return quality;
+}
+
 class Blocks final : public JpegBlocks {
 public:
     Blocks() { jpeg_.err = &failure_.base; }
@@ -94,8 +120,12 @@ public:
         jpeg_read_header(&jpeg_, TRUE);
         if (!canBeCut()) return false;
         blocks_ = jpeg_read_coefficients(&jpeg_);
-        return isComplete();
+        if (!isComplete() || jpeg_.comp_info[0].quant_table == nullptr) return false;
+        quality_ = qualityOf(stepsOf(*jpeg_.comp_info[0].quant_table));
+        return true;
     }
+
+    [[nodiscard]] int quality() const override { return quality_; }
 
     [[nodiscard]] std::vector<std::byte> tile(const ImageLevel& level, glm::uvec2 tile) const override {
         assert(level.width == jpeg_.image_width && level.height == jpeg_.image_height);
@@ -147,6 +177,7 @@ private:
     mutable JpegFailure failure_;
     mutable std::mutex mutex_;
     jvirt_barray_ptr* blocks_ = nullptr;
+    int quality_ = 0;
 };
 
 }  // namespace

@@ -22,6 +22,8 @@ public:
     static std::unique_ptr<JpegBlocks> read(const std::string& file);
     virtual ~JpegBlocks() = default;
 
+    /// Returns the quality of which libjpeg's steps are as large as the picture's, of light and in the mean; 1 to 100.
+    [[nodiscard]] virtual int quality() const = 0;
     /// Returns a tile of the picture's finest level; empty where it would show other colours, or there is no memory.
     /// Precondition: the level has the picture's size. Any thread.
     [[nodiscard]] virtual std::vector<std::byte> tile(const ImageLevel& level, glm::uvec2 tile) const = 0;

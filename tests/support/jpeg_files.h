@@ -3,6 +3,7 @@
 
 #include <cstdio>
 #include <cstdlib>
+#include <ostream>
 #include <string>
 #include <vector>
 
@@ -20,6 +21,12 @@ struct JpegKind {
     int sampling[2] = {2, 2};                ///< of light: along x and y, as often as of colour
     std::vector<jpeg_scan_info> scans = {};  ///< none: as the others say
 };
+
+inline std::ostream& operator<<(std::ostream& out, const JpegKind& kind) {
+    return out << (kind.progressive ? "progressive " : "") << (kind.isArithmetic ? "arithmetic " : "") << "colours "
+               << int(kind.colours) << ", quality " << kind.quality << ", " << kind.sampling[0] << " x "
+               << kind.sampling[1];
+}
 
 inline std::string jpegOf(const Image& image, const JpegKind& kind = {}) {
     jpeg_compress_struct jpeg{};

@@ -108,7 +108,7 @@ void addImages(CLI::App& app, BuildOptions& options) {
     addParsed(app, "--colour-quality,--color-quality", options.imageQuality, imageQualityNamed,
               "source, lossless or 1 to 100",
               "How images are coded: source (the finest level as the mesh brings it: a JPEG's own blocks, and without "
-              "loss what is PNG; coarser ones as JPEGs of quality 90), lossless, or all as JPEGs of a quality of 1 to "
+              "loss what is PNG; coarser ones as JPEGs that are as good), lossless, or all as JPEGs of a quality of 1 to "
               "100 where these are smaller")
         ->type_name("source|lossless|N")
         ->default_str("source");

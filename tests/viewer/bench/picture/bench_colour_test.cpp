@@ -103,9 +103,12 @@ TEST_F(BenchColour, OneColourIsExact) {
 }
 
 TEST_F(BenchColour, ASlopeIsKeptByCornersAlone) {
-    const auto rows = rowsOf(writeSquare(16, 64, [](uint32_t x, uint32_t y, int channel) {
-        return uint8_t(channel == 0 ? 40 + 3 * x : channel == 1 ? 200 - 2 * y : 128);
-    }));
+    const auto rows =
+        rowsOf(writeSquare(16, 64,
+                           [](uint32_t x, uint32_t y, int channel) {
+                               return uint8_t(channel == 0 ? 40 + 3 * x : channel == 1 ? 200 - 2 * y : 128);
+                           }),
+               "--no-images");
     for (const auto& [name, row] : rows) {
         EXPECT_LT(row["delta_e_mean"], 0.5) << name;
         // A corner of the border has triangles on one side alone; `vertex` takes more of them.
@@ -115,20 +118,25 @@ TEST_F(BenchColour, ASlopeIsKeptByCornersAlone) {
 
 TEST_F(BenchColour, StripesFinerThanCornersAreTheirMeanAndTheMeasureSeesIt) {
     // Two black and two white texels in turn, four turns between two corners.
-    const auto rows = rowsOf(
-        writeSquare(8, 128, [](uint32_t x, uint32_t, int) { return uint8_t(x / 2 % 2 ? 255 : 0); }), "--cameras close");
+    const fs::path square = writeSquare(8, 128, [](uint32_t x, uint32_t, int) { return uint8_t(x / 2 % 2 ? 255 : 0); });
+    const auto rows = rowsOf(square, "--cameras close --no-images");
     // Half the light is 73.5 of lightness: black differs by as much, white by 26.5; together about 50.
     for (const char* name : {"close certified", "close vertex"}) {
         EXPECT_GT(rows.at(name)["delta_e_mean"], 30) << name;
         EXPECT_LT(rows.at(name)["delta_e_mean"], 60) << name;
     }
     EXPECT_LT(rows.at("close texture")["delta_e_mean"], 15);
+    EXPECT_LT(rowsOf(square, "--cameras close --methods certified").at("close certified")["delta_e_mean"], 1)
+        << "an image that is kept shows them";
 }
 
 TEST_F(BenchColour, CornersAreNoWorseThanColoursOfTheMeshsVertices) {
-    const auto rows = rowsOf(writeSquare(32, 128, [](uint32_t x, uint32_t y, int channel) {
-        return uint8_t(128 + 100 * std::sin(0.1 * x + channel) * std::cos(0.13 * y));
-    }));
+    const auto rows =
+        rowsOf(writeSquare(32, 128,
+                           [](uint32_t x, uint32_t y, int channel) {
+                               return uint8_t(128 + 100 * std::sin(0.1 * x + channel) * std::cos(0.13 * y));
+                           }),
+               "--no-images");
     for (const char* camera : {"whole", "half", "close"}) {
         const double certified = rows.at(std::string(camera) + " certified")["delta_e_mean"];
         const double vertex = rows.at(std::string(camera) + " vertex")["delta_e_mean"];
