@@ -48,12 +48,18 @@ json jsonOf(const PartPlan& plan) {
     json inputs = json::array();
     for (const PlannedInput& each : plan.inputs)
         inputs.push_back({{"path", each.path.string()}, {"stamp", each.stamp}, {"hash", each.hash}});
-    return {{"program", plan.program},  {"parts", plan.parts},
-            {"inputs", inputs},         {"output", o.output.string()},
-            {"overwrite", o.overwrite}, {"format", o.format},
-            {"cell", o.cell},           {"colour", int(o.colour)},
-            {"images", keepsImages(o)},   {"image_quality", {o.imageQuality.finest.value_or(-1), o.imageQuality.coarser.value_or(-1)}},
-            {"memory", o.memoryBytes},  {"vertex_normals", int(o.vertexNormals)}};
+    return {{"program", plan.program},
+            {"parts", plan.parts},
+            {"inputs", inputs},
+            {"output", o.output.string()},
+            {"overwrite", o.overwrite},
+            {"format", o.format},
+            {"cell", o.cell},
+            {"colour", int(o.colour)},
+            {"images", keepsImages(o)},
+            {"image_quality", {o.imageQuality.finest.value_or(-1), o.imageQuality.coarser.value_or(-1)}},
+            {"memory", o.memoryBytes},
+            {"vertex_normals", int(o.vertexNormals)}};
 }
 
 PartPlan planFrom(const json& j) {
