@@ -105,11 +105,12 @@ void addImages(CLI::App& app, BuildOptions& options) {
         "--images,!--no-images", [&options](int64_t times) { options.keepImages = times > 0; },
         "Keep the images of materials, too, as sharp as they are, with their place on the triangles; browsers "
         "do not draw from them yet [on, but with --error]");
-    addParsed(app, "--colour-quality,--color-quality", options.imageQuality, imageQualityNamed,
-              "source, lossless or 1 to 100",
-              "How images are coded: source (the finest level as the mesh brings it: a JPEG's own blocks, and without "
-              "loss what is PNG; coarser ones as JPEGs that are as good), lossless, or all as JPEGs of a quality of 1 to "
-              "100 where these are smaller")
+    addParsed(
+        app, "--colour-quality,--color-quality", options.imageQuality, imageQualityNamed,
+        "source, lossless or 1 to 100",
+        "How images are coded: source (the finest level as the mesh brings it: a JPEG's own blocks, and without "
+        "loss what is PNG; coarser ones as JPEGs that are as good), lossless, or all as JPEGs of a quality of 1 to "
+        "100 where these are smaller")
         ->type_name("source|lossless|N")
         ->default_str("source");
 }
