@@ -51,9 +51,9 @@ struct BuildProgress {
 
 /// How the images that a file keeps are coded. A JPEG's quality goes from 1 to 100; 0: without loss.
 struct ImageQuality {
-    /// Of the finest level; nothing: as the source has it, which is a JPEG's own blocks, and else without loss.
+    /// The finest level's; nothing: it is as the source has it, which is a JPEG's own blocks, and else without loss.
     std::optional<int> finest;
-    /// Of the levels above it, which are means of light; nothing: what a source's JPEG has, 80 at least, and else 95.
+    /// That of the levels above, which are means of light; nothing: a source's JPEG says it, 80 to 95, and else 95.
     std::optional<int> coarser;
 
     bool operator==(const ImageQuality&) const = default;

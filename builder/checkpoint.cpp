@@ -193,10 +193,11 @@ Result<void> reopenSpools(std::deque<PageSpool>& spools, const SpoolLengths& len
 }  // namespace
 
 std::string settingsText(const BuildOptions& options) {
+    // How images are coded matters where some are kept.
+    const ImageQuality quality = keepsImages(options) ? options.imageQuality : ImageQuality();
     return fmt::format("{} {:a} {:a} {} {} {} {} {} {} {} {}", kFileVersion, options.cell, options.error,
                        options.errorIsRelative, int(options.colour), int(options.coarseLeaves), keepsImages(options),
-                       keepsImages(options) ? options.imageQuality.finest.value_or(-1) : 0,
-                       keepsImages(options) ? options.imageQuality.coarser.value_or(-1) : 0, int(options.vertexNormals),
+                       quality.finest.value_or(-1), quality.coarser.value_or(-1), int(options.vertexNormals),
                        options.format);
 }
 

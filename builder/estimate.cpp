@@ -10,6 +10,7 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
+#include "builder/bin_passes.h"
 #include "builder/build_sample.h"
 #include "builder/image_store.h"
 #include "builder/lattice/exact_sum.h"
@@ -198,16 +199,16 @@ Result<BuildEstimate> estimateBuild(const BuildOptions& options) {
     estimate.warning = wideCellWarning(options, m);
     BuildOptions whole = options;
     if (options.errorIsRelative) whole.error *= glm::length(m.boundsMax - m.boundsMin);
-    const bool hasColour =
-        m.hasVertexColours && options.colour != ColourChoice::None && options.colour != ColourChoice::Texture;
-    VCP_TRY_ASSIGN(const auto figures, buildSample(whole, estimate.frame.cell, sample, hasColour));
+    const ColourUse use = colourUseOf(options, m);
+    VCP_TRY_ASSIGN(const auto figures, buildSample(whole, estimate.frame.cell, sample, use.vertices));
     estimate.memoryBytes =
         std::min(estimate.memoryCap, fixedMemoryBytes(threads) +
                                          uint64_t(kFirstMemoryBytes + kMemoryBytesPerTriangle * double(m.triangles)));
-    const bool hasImages =
-        m.hasMaterials && (options.colour == ColourChoice::Auto || options.colour == ColourChoice::Texture);
-    const double besides = hasImages ? kImageBytesPerTriangle + (imageBytes > 0 ? kPlaceBytesPerTriangle : 0) : 0;
-    estimate.fileBytes = uint64_t((figures.fileBytes + besides) * double(m.triangles)) + (hasImages ? imageBytes : 0);
+    if (!use.materials) imageBytes = 0;
+    double bytesPerTriangle = figures.fileBytes;
+    if (use.materials) bytesPerTriangle += kImageBytesPerTriangle;
+    if (imageBytes > 0) bytesPerTriangle += kPlaceBytesPerTriangle;
+    estimate.fileBytes = uint64_t(bytesPerTriangle * double(m.triangles)) + imageBytes;
     estimate.seconds = reading + figures.seconds * double(m.triangles);
     // A checkpoint writes all that is held in memory.
     const bool mayCheckpoint = kSlower * estimate.seconds > options.checkpointSeconds;

@@ -27,7 +27,7 @@ namespace {
 // a triangle is stored in the fewest bytes (docs/surface.md).
 constexpr double kTriangleAreaPerCellArea = 0.105;
 
-// Of triangles that are longer in the mean than so many cells, each would be in more leaves than it takes to store it.
+// Where triangles are longer in the mean than so many cells, each would be in more leaves than it takes to store it.
 constexpr double kMostMeanEdgeCells = 2;
 
 // Extent limit: positions are 31-bit lattice coordinates.

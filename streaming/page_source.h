@@ -25,9 +25,9 @@ struct PageOrigin {
 class PageSource {
 public:
     virtual ~PageSource() = default;
-    /// A page's bytes, verified, decompressed and parsed without complaint (readPage). Colour is empty where the
-    /// dataset has none or it is not asked for. Of a block of the directory: no bytes, but its entries are known now.
-    /// Of a piece of images: its texels.
+    /// Returns a page's bytes, verified, decompressed and parsed without complaint (readPage). Colour is empty where
+    /// the dataset has none or it is not asked for. A block of the directory has no bytes, but its entries are known
+    /// then. A piece of images has its texels.
     virtual Result<PageBytes> read(Request request, bool withColour) const = 0;
 
     /// `first` and what follows it, `count` in all, as read() would give each; where they lie together, in one read.

@@ -60,7 +60,7 @@ private:
     struct Levels {
         uint32_t coarsest, deepest;
     };
-    /// Of a parted page, the numbers of those of its eight parts that are parted themselves; kWhole for the others.
+    /// A parted page has the numbers of those of its eight parts that are parted themselves; kWhole for the others.
     using Parts = std::array<uint32_t, 8>;
     static constexpr uint32_t kWhole = 0xffffffff;
 

@@ -296,7 +296,7 @@ Result<void> RawBins::load(size_t bin, std::span<std::byte> out) const {
     if (at != out.size()) return damagedTempFile(file_.path());
     std::vector<Result<void>> done(blocks.size());
     tbb::parallel_for(size_t{0}, blocks.size(), [&](size_t i) { done[i] = read(blocks[i], out.data() + begin[i]); });
-    // Of several damaged blocks the first is named.
+    // The first of several damaged blocks is named.
     for (auto& each : done) VCP_TRY(std::move(each));
     return {};
 }

@@ -10,7 +10,7 @@
 
 #include "builder/stream/random_bytes.h"
 #include "builder/texture/png_chunks.h"
-#include "octree/image/jpeg_failure.h"
+#include "octree/image/jpeg_library.h"
 
 // This header comes after those that it needs.
 #include <jerror.h>

@@ -7,7 +7,7 @@
 #include <mutex>
 #include <numeric>
 
-#include "octree/image/jpeg_failure.h"
+#include "octree/image/jpeg_library.h"
 
 namespace vcp {
 
@@ -41,11 +41,11 @@ public:
             const auto blocksOf = [](uint32_t texels, int factor, int most) {
                 return (texels * uint32_t(factor) + uint32_t(most) * DCTSIZE - 1) / (uint32_t(most) * DCTSIZE);
             };
-            const auto height = uint32_t(from.v_samp_factor);
-            width_[c] = blocksOf(size_.x, from.h_samp_factor, picture.max_h_samp_factor);
-            height_[c] = blocksOf(size_.y, from.v_samp_factor, picture.max_v_samp_factor);
+            const uint32_t width = blocksOf(size_.x, from.h_samp_factor, picture.max_h_samp_factor);
+            const uint32_t height = blocksOf(size_.y, from.v_samp_factor, picture.max_v_samp_factor);
+            const auto together = uint32_t(from.v_samp_factor);  // rows
             blocks_[c] = jpeg_.mem->request_virt_barray(reinterpret_cast<j_common_ptr>(&jpeg_), JPOOL_IMAGE, TRUE,
-                                                        width_[c], (height_[c] + height - 1) / height * height, height);
+                                                        width, (height + together - 1) / together * together, together);
         }
         jpeg_write_coefficients(&jpeg_, blocks_);
         for (int c = 0; c < picture.num_components; ++c) {
@@ -53,12 +53,13 @@ public:
             const glm::uvec2 first(
                 corner.x * uint32_t(from.h_samp_factor) / uint32_t(picture.max_h_samp_factor * DCTSIZE),
                 corner.y * uint32_t(from.v_samp_factor) / uint32_t(picture.max_v_samp_factor * DCTSIZE));
-            for (uint32_t y = 0; y < height_[c]; ++y) {
+            const jpeg_component_info& to = jpeg_.comp_info[c];
+            for (uint32_t y = 0; y < to.height_in_blocks; ++y) {
                 const JBLOCKROW source = picture.mem->access_virt_barray(reinterpret_cast<j_common_ptr>(&picture),
                                                                          blocks[c], first.y + y, 1, FALSE)[0];
                 const JBLOCKROW target =
                     jpeg_.mem->access_virt_barray(reinterpret_cast<j_common_ptr>(&jpeg_), blocks_[c], y, 1, TRUE)[0];
-                std::memcpy(target, source + first.x, width_[c] * sizeof(JBLOCK));
+                std::memcpy(target, source + first.x, to.width_in_blocks * sizeof(JBLOCK));
             }
         }
         return true;
@@ -78,7 +79,6 @@ private:
     jpeg_compress_struct jpeg_{};
     JpegFailure failure_;
     jvirt_barray_ptr blocks_[MAX_COMPONENTS] = {};
-    uint32_t width_[MAX_COMPONENTS] = {}, height_[MAX_COMPONENTS] = {};  // in blocks
 };
 
 /// Returns the sum of a table's steps.
@@ -130,7 +130,7 @@ public:
     [[nodiscard]] std::vector<std::byte> tile(const ImageLevel& level, glm::uvec2 tile) const override {
         assert(level.width == jpeg_.image_width && level.height == jpeg_.image_height);
         const glm::uvec2 size = level.sizeOf(tile);
-        // Of so few columns, halved colours are not blended.
+        // A decoder does not blend halved colours where there are so few columns.
         if (size.x <= 4 && size.x < level.width) return {};
         TileWriter writer(size);
         {

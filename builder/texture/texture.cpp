@@ -76,7 +76,7 @@ Ellipse ellipseOf(const TextureFootprint& footprint, const Image& finest) {
     const double xx = footprint.uu * w * w, xy = footprint.uv * w * h, yy = footprint.vv * h * h;
     const double mean = (xx + yy) / 2, apart = std::hypot((xx - yy) / 2, xy);
     const double length = std::sqrt(mean + apart), width = std::sqrt(std::max(mean - apart, 0.0));
-    // Of the two ways to write the direction, the one that does not cancel.
+    // There are two ways to write the direction; this one does not cancel.
     glm::dvec2 direction = xx > yy ? glm::dvec2((xx - yy) / 2 + apart, xy) : glm::dvec2(xy, (yy - xx) / 2 + apart);
     const double size = std::hypot(direction.x, direction.y);
     direction = size > 0 ? direction / size : glm::dvec2(0);

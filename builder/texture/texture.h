@@ -28,7 +28,8 @@ struct TextureFootprint {
 
     /// As wide in all directions.
     static TextureFootprint round(double width) { return {width * width, 0, width * width}; }
-    /// Of the sample that says a corner's colour in one triangle; of an equilateral one as wide as kCornerWidth edges.
+    /// Returns that of the sample which says a corner's colour in one triangle; kCornerWidth edges wide where these are
+    /// equal.
     /// The order of the corners does not matter.
     static TextureFootprint ofCorner(const glm::vec2 (&uv)[3]);
 };

@@ -32,7 +32,7 @@ std::vector<uint32_t> finestWithin(std::span<const ImageRow> images, std::vector
     std::vector<std::vector<ImageLevel>> levels;
     uint64_t bytes = 0;
     for (size_t i = 0; i < images.size(); ++i) {
-        levels.push_back(imageLevels(images[i].width, images[i].height, 0));
+        levels.push_back(levelsOf(images[i]));
         for (size_t l = finest[i]; l < levels.back().size(); ++l) bytes += levels.back()[l].texels() * sizeof(uint32_t);
     }
     // What the finest level of an image takes that may go.

@@ -1,6 +1,6 @@
 #include "octree/image/jpeg_tile.h"
 
-#include "octree/image/jpeg_failure.h"
+#include "octree/image/jpeg_library.h"
 
 namespace vcp {
 

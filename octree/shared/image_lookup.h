@@ -75,7 +75,7 @@ INLINE ImageFootprint imageFootprint(TextureSlope slope, Real3 n, Real3 directio
     Real difference = (xx - yy) * Real(0.5);
     Real apart = sqrt(difference * difference + xy * xy);
     Real longest = sqrt(mean + apart);
-    // Of the two ways to write the direction, the one that does not cancel.
+    // There are two ways to write the direction; this one does not cancel.
     Real2 towards = xx > yy ? Real2(difference + apart, xy) : Real2(xy, apart - difference);
     Real scale = longest / sqrt(max(dot(towards, towards), Real(1e-30)));
     ImageFootprint footprint;

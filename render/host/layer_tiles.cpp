@@ -79,7 +79,7 @@ LayerTiles::LayerTiles(const HostLayer& layer, glm::ivec2 size)
 }
 
 void LayerTiles::cast(TileHits& hits) const {
-    // Of many datasets most are elsewhere in the picture.
+    // Most of many datasets are elsewhere in the picture.
     if (!pixels_.meets(hits.corner)) return;
     castTile(layer_.scene, layer_.rays, hits);
     if (layer_.caps != Caps::None) castCaps(layer_.scene, layer_.rays, layer_.caps, hits, cameraMarks());

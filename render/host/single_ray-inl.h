@@ -130,8 +130,7 @@ private:
             const glm::ivec3 corner = glm::ivec3((at.corner - page.corner) >> page.cellBits) * kSteps;
             const PageView& view = *page.view;
             StripWalk walk(view.strips, at.word);
-            // Of a leaf with more triangles than there is room for, only the last ones are left: it is decoded each
-            // time.
+            // A leaf with more triangles than there is room for has only its last ones left: it is decoded each time.
             bool isLong = false;
             for (leaf.count = 0; leaf.count < kDecodedParts && nextTriangles(walk, leaf.triangles[leaf.count]);) {
                 loadVertices(view, corner, leaf.triangles[leaf.count]);

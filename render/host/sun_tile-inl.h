@@ -155,7 +155,7 @@ private:
         }
     }
 
-    /// Of a hit only its distance counts.
+    /// Only a hit's distance counts.
     [[nodiscard]] static uint32_t nextLeaf() { return 0; }
     void keepLeaf(const WalkEntry& at) {
         if (marks_ != nullptr) marks_->mark(at.page);

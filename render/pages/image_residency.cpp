@@ -84,7 +84,7 @@ void ImageResidency::take(uint64_t piece, std::span<const uint32_t> texels) {
 
 void ImageResidency::giveUp(uint64_t piece) {
     const ImagePiece what = assembly_.pieces().piece(piece);
-    // Of the levels of a first piece some may be there.
+    // Some levels of a first piece may be there.
     const bool isFirst = what.level == assembly_.pieces().firstLevel(what.image);
     const uint32_t next = isFirst ? assembly_.set().images()[what.image].finest : what.level + 1;
     readable_[what.image] = std::max(readable_[what.image], next);

@@ -44,7 +44,7 @@ TEST(BuildSample, IsBoundedAndOfWholeCubes) {
     }
     const size_t held = sample.triangles().size();
     EXPECT_GT(held, 20000u);
-    // Of a triangle inside of a cube the neighbours are there as well.
+    // A triangle inside of a cube has its neighbours there as well.
     std::set<std::pair<double, double>> corners;
     for (const auto& t : sample.triangles()) corners.insert({std::round(t.corner[0].x), std::round(t.corner[0].y)});
     size_t alone = 0;

@@ -219,7 +219,7 @@ TEST_F(ColourLevels, ACheckerboardKeepsItsLight) {
     const Shown shown(folder_ / "out.vcp", 6);
     const auto compared = compare(shown);
     EXPECT_GE(levelsOf(compared), 3u);
-    // Of cells that hold many squares, half of the light is left. Half of the stored values would be 0.21 of it.
+    // Cells that hold many squares have half of the light left. Half of the stored values would be 0.21 of it.
     int mixed = 0;
     for (const PlacedSlab& slab : compared) {
         if (slab.box.edge < 8) continue;

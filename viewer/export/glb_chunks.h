@@ -6,7 +6,7 @@
 
 namespace vcp {
 
-/// Of the file and of its two chunks, without what is in these.
+/// The headers of the file and of its two chunks take so many bytes.
 inline constexpr uint64_t kGlbFrameBytes = 28;
 
 /// Appends a number as its bytes, little endian like the processor's.

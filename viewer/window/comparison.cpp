@@ -29,7 +29,7 @@ constexpr uint64_t kTrianglesALeaf = 9, kTrianglesASlab = 3;
 
 // A picture of a surface is some such number of colours long.
 constexpr double kEdgesADiagonal = 200;
-// Of a legend: characters of a name in its title; numbers and colours on each side of zero.
+// A legend has so many characters of a name in its title, and numbers and colours on each side of zero.
 constexpr size_t kLongestName = 28;
 constexpr int kTicks = 2, kStops = 32;
 

@@ -92,7 +92,7 @@ TEST(MeshOf, OwnNormalsStayWithTheirCorners) {
         std::rotate(soup.begin(), soup.begin() + 1, soup.end());
         LatticeMesh mesh = meshOf(soup, false);
         ASSERT_EQ(mesh.triangles, (Triangles{{0, 1, 2}, {1, 3, 2}}));
-        // Of the latticeTriangle that is there twice, the least.
+        // The triangle that is there twice has its least normals.
         EXPECT_EQ(mesh.cornerNormals, (std::vector<std::array<uint32_t, 3>>{{10, 20, 30}, {none, none, none}}));
         mesh.normals = {1, 5, 7, 9};
         EXPECT_EQ(mesh.normalOf(0, 2), 30u);

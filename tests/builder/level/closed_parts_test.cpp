@@ -158,7 +158,7 @@ TEST(ClosedParts, SliversWithoutAreaKeepASurfaceClosed) {
     EXPECT_EQ(foundIn(soup, PagePartition()).counts.openEdges, 3u);
 }
 
-// Of two sides on the same triangles one stays, so a sheet with two sides is open.
+// One of two sides on the same triangles stays, so a sheet with two sides is open.
 TEST(ClosedParts, ASheetWithTwoSidesIsOpen) {
     Soup soup = test::soupOf(
         test::gridSurface(5, 5, false, [](double u, double v) { return glm::dvec3(10 + 8 * u, 10 + 8 * v, 20); }));

@@ -71,7 +71,7 @@ TEST_F(Pieces, EachTileIsInOne) {
     EXPECT_EQ(pieces_->piecesOf(0, 10).first, 0u);
     EXPECT_EQ(pieces_->firstLevel(1), 1u);
     EXPECT_EQ(pieces_->firstLevel(2), 0u);
-    // Of larger tiles 5 x 3, then 3 x 2; then 275 x 175, which is two tiles, and below it a tile each.
+    // There are 5 x 3 larger tiles, then 3 x 2; then 275 x 175 is two tiles, and what is below it a tile each.
     EXPECT_EQ(pieces_->piecesOf(3, 0).end - pieces_->piecesOf(3, 0).first, 4u);
     EXPECT_EQ(pieces_->piecesOf(3, 1).end - pieces_->piecesOf(3, 1).first, 2u);
     EXPECT_EQ(pieces_->piecesOf(3, 3).end - pieces_->piecesOf(3, 3).first, 1u);
@@ -104,7 +104,7 @@ TEST_F(Pieces, OfDroppedLevelsComeAgain) {
     EXPECT_FALSE(assembly.has(pieces_->piecesOf(0, 1).first));
     EXPECT_TRUE(assembly.has(pieces_->piecesOf(0, 2).first));
     expectStored(assembly.set());
-    // Of the first piece's levels some stay.
+    // Some of the first piece's levels stay.
     assembly.drop(0, 8);
     EXPECT_FALSE(assembly.has(0));
     expectStored(assembly.set());

@@ -146,7 +146,7 @@ TEST_F(ImageFile, EveryTruncationIsFound) {
 TEST_F(ImageFile, EveryBitFlipIsFound) {
     TableFile file(bytes_);
     for (size_t bit = 0; bit < 8 * bytes_.size(); ++bit) {
-        // Of the padding within the header a few bits stand for all.
+        // A few bits of the padding within the header stand for all.
         if (bit / 8 >= sizeof(FileHeader) && bit / 8 < place().offset && bit % 64 != 3) continue;
         file.bytes[bit / 8] ^= std::byte{1} << int(bit % 8);
         ASSERT_FALSE(verifyFile(file).ok()) << bit;

@@ -159,7 +159,7 @@ void expectSame(const PageCache& cache, const std::vector<uint64_t>& cut, glm::d
         SCOPED_TRACE(named.name);
         const Comparison c = comparer.compare(named.camera);
         EXPECT_EQ(c.wrong, 0u);
-        // Of some views, sections leave nothing.
+        // Sections leave nothing of some views.
         EXPECT_GE(c.hit, comparer.isCut() ? 0u : 1000u);
         hits += c.hit;
         EXPECT_LE(c.silhouette * 500, c.hit);

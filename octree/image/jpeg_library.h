@@ -1,4 +1,4 @@
-// What libjpeg says where it fails, which is a call that must not return, and where it writes to.
+// libjpeg as it is used here: how it fails, which is a call that must not return, and where it writes to.
 //
 //   JpegFailure failure;
 //   jpeg.err = &failure.base;

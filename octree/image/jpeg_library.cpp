@@ -1,4 +1,4 @@
-#include "octree/image/jpeg_failure.h"
+#include "octree/image/jpeg_library.h"
 
 #include <cstdlib>
 
