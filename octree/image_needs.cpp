@@ -1,6 +1,7 @@
 #include "octree/image_needs.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 
@@ -33,26 +34,107 @@ float texelsPerCell(const PageView& page, const Index3& corners, glm::vec2 size)
     return hasArea && texels >= 0 ? texels : std::numeric_limits<float>::infinity();
 }
 
+// How far from its place a footprint is read, texels of the finer of its levels: its places are seven texels apart at
+// most, from first to last, or each is as long as eight; and between texels.
+constexpr int kReach = 10;
+constexpr uint32_t kMostBlocks = 128;
+
+/// The blocks of an image that triangles lie in.
+class Blocks {
+public:
+    explicit Blocks(const ImageRow& image)
+        : across_(blocksAcross(image)), size_(image.width, image.height), has_(size_t{across_} * across_) {}
+
+    /// `material`: of the three points.
+    void add(const TexturePoint& a, const TexturePoint& b, const TexturePoint& c, const MaterialRow& material) {
+        const Range u = range(std::min({a.u, b.u, c.u}), std::max({a.u, b.u, c.u}), size_.x, material.wrapU);
+        const Range v = range(std::min({a.v, b.v, c.v}), std::max({a.v, b.v, c.v}), size_.y, material.wrapV);
+        const int size = int(across_);
+        for (int64_t y = v.first; y <= v.last; ++y) {
+            const int row = f32::wrappedTexel(int(y), size, uint32_t(material.wrapV));
+            for (int64_t x = u.first; x <= u.last; ++x)
+                has_[size_t(row * size + f32::wrappedTexel(int(x), size, uint32_t(material.wrapU)))] = true;
+        }
+    }
+    [[nodiscard]] std::vector<uint16_t> all() const {
+        std::vector<uint16_t> blocks;
+        for (size_t i = 0; i < has_.size(); ++i)
+            if (has_[i]) blocks.push_back(uint16_t(i));
+        return blocks;
+    }
+
+private:
+    struct Range {
+        int64_t first, last;
+    };
+    /// Returns the blocks from `low` to `high`, steps of a coordinate, and about them what the finest level reads.
+    [[nodiscard]] Range range(int32_t low, int32_t high, uint32_t texels, ImageWrap wrap) const {
+        const double reach = double(kReach) / texels;
+        const auto at = [&](double place) { return int64_t(std::floor(place * double(across_))); };
+        Range range{at(double(low) * kTextureUnit - reach), at(double(high) * kTextureUnit + reach)};
+        if (wrap == ImageWrap::Clamp) {
+            range.first = std::clamp<int64_t>(range.first, 0, across_ - 1);
+            range.last = std::clamp<int64_t>(range.last, 0, across_ - 1);
+        }
+        // After two repetitions all were there, mirrored or not.
+        const int64_t period = 2 * int64_t{across_};
+        const int64_t before = int64_t(std::floor(double(range.first) / double(period))) * period;
+        return {range.first - before, std::min(range.last, range.first + period) - before};
+    }
+
+    uint32_t across_;
+    glm::uvec2 size_;
+    std::vector<bool> has_;
+};
+
+struct Texels {
+    int64_t first, last;
+};
+
+/// Returns the texels of a row of a level that are read about a block. Blocks hold what is read of level 0; of a coarser
+/// one, as many texels are, which are wider.
+Texels texelsOf(uint32_t block, uint32_t across, uint32_t size, uint32_t level) {
+    const int64_t reach = level == 0 ? 0 : kReach;
+    const uint64_t end = (uint64_t{block} + 1) * size;
+    return {int64_t(uint64_t{block} * size / across) - reach, int64_t((end + across - 1) / across) - 1 + reach};
+}
+
+/// Visits the tiles of a row of texels. Beyond an edge an image goes on from the other one; or with what is at this one,
+/// which is among them.
+template <class Visit>
+void forEachTile(Texels texels, int64_t size, uint32_t edge, const Visit& visit) {
+    if (texels.last - texels.first >= size) texels = {0, size - 1};
+    for (int64_t at = texels.first; at <= texels.last;) {
+        const int64_t inside = (at % size + size) % size;
+        visit(uint32_t(inside / edge));
+        at += std::min<int64_t>(edge - inside % edge, size - inside);
+    }
+}
+
 }  // namespace
 
 std::vector<ImageNeed> imageNeeds(const ImageTables& tables, const PageView& page) {
     std::vector<ImageNeed> needs;
     if (page.points.empty()) return needs;
     std::vector<int64_t> placeOf;  // in `needs`, by image
+    std::vector<Blocks> blocks;    // of each of `needs`
     forEachTriangle(page, [&](const Index3& corners) {
-        const uint32_t material = page.points[corners[0]].material;
-        if (material == 0 || material > tables.materials.size()) return;
-        const uint32_t image = tables.materials[material - 1].image;
-        if (placeOf.size() <= image) placeOf.resize(tables.images.size(), -1);
-        const glm::vec2 size(float(tables.images[image].width), float(tables.images[image].height));
-        const float texels = texelsPerCell(page, corners, size);
-        if (placeOf[image] < 0) {
-            placeOf[image] = int64_t(needs.size());
-            needs.push_back({image, texels});
+        const uint32_t number = page.points[corners[0]].material;
+        if (number == 0 || number > tables.materials.size()) return;
+        const MaterialRow& material = tables.materials[number - 1];
+        const ImageRow& image = tables.images[material.image];
+        if (placeOf.size() <= material.image) placeOf.resize(tables.images.size(), -1);
+        const float texels = texelsPerCell(page, corners, glm::vec2(float(image.width), float(image.height)));
+        if (placeOf[material.image] < 0) {
+            placeOf[material.image] = int64_t(needs.size());
+            needs.push_back({material.image, texels, {}});
+            blocks.emplace_back(image);
         }
-        float& least = needs[size_t(placeOf[image])].texelsPerCell;
-        least = std::min(least, texels);
+        const auto at = size_t(placeOf[material.image]);
+        needs[at].texelsPerCell = std::min(needs[at].texelsPerCell, texels);
+        blocks[at].add(page.points[corners[0]], page.points[corners[1]], page.points[corners[2]], material);
     });
+    for (size_t i = 0; i < needs.size(); ++i) needs[i].blocks = blocks[i].all();
     return needs;
 }
 
@@ -62,6 +144,28 @@ uint32_t finestNeeded(float texelsPerCell, double pixelEdge, uint32_t levels) {
     const double texels = double(texelsPerCell) * pixelEdge * double(f32::kFootprintPixels) * kRounding;
     if (!(texels > 1)) return 0;
     return uint32_t(std::min(std::floor(std::log2(texels)), double(levels - 1)));
+}
+
+uint32_t blocksAcross(const ImageRow& image) {
+    return std::clamp(std::bit_floor(std::max(image.width, image.height) / kFirstEdge), 1u, kMostBlocks);
+}
+
+std::vector<uint32_t> piecesNeeded(const ImagePieces& pieces, const ImageNeed& need, uint32_t level) {
+    const ImageLevel& of = pieces.levelsOf(need.image)[level];
+    const uint32_t across = blocksAcross(pieces.tables().images[need.image]);
+    std::vector<bool> has(of.tiles());
+    for (const uint16_t block : need.blocks)
+        forEachTile(texelsOf(block / across, across, of.height, level), of.height, of.tileEdge, [&](uint32_t row) {
+            forEachTile(texelsOf(block % across, across, of.width, level), of.width, of.tileEdge,
+                        [&](uint32_t column) { has[size_t{row} * of.tilesX() + column] = true; });
+        });
+    std::vector<uint32_t> needed;
+    for (uint32_t i = 0; i < has.size(); ++i)
+        if (has[i])
+            needed.push_back(uint32_t(pieces.pieceOf(need.image, level, {i % of.tilesX(), i / of.tilesX()})));
+    std::sort(needed.begin(), needed.end());
+    needed.erase(std::unique(needed.begin(), needed.end()), needed.end());
+    return needed;
 }
 
 }  // namespace vcp

@@ -1,11 +1,11 @@
-// How finely the triangles of a page show images: which of an image's levels a view needs follows from it.
+// What the triangles of a page show of images, and how finely: which tiles of an image a view needs follows from it.
 #pragma once
 
 #include <cstdint>
 #include <vector>
 
 #include "octree/image/image_need.h"
-#include "octree/image/image_tables.h"
+#include "octree/image/image_pieces.h"
 #include "octree/page/page.h"
 
 namespace vcp {
@@ -17,5 +17,12 @@ std::vector<ImageNeed> imageNeeds(const ImageTables& tables, const PageView& pag
 /// Returns the finest level that a need asks for where pixels are so wide, cells of the page: no footprint of a pixel
 /// there (octree/shared/image_lookup.h) reads a finer one.
 uint32_t finestNeeded(float texelsPerCell, double pixelEdge, uint32_t levels);
+
+/// Returns into how many blocks an image is divided along both axes; they are as wide as kFirstEdge texels, or wider.
+uint32_t blocksAcross(const ImageRow& image);
+
+/// Returns the pieces of a level that pixels read where the level is the finest that the need asks for, or the next
+/// one: each once, ascending.
+std::vector<uint32_t> piecesNeeded(const ImagePieces& pieces, const ImageNeed& need, uint32_t level);
 
 }  // namespace vcp

@@ -26,7 +26,7 @@ std::optional<ImagedTriangle> imagedTriangle(const ImageSet& images, const PageV
     const TexturePoint &a = page.points[corners[0]], &b = page.points[corners[1]], &c = page.points[corners[2]];
     if (a.material == 0 || a.material > images.materials().size()) return {};
     const MaterialRow& material = images.materials()[a.material - 1];
-    if (images.images()[material.image].levels.empty()) return {};
+    if (!images.images()[material.image].isShown()) return {};
     const PlacedAxis u = placedAxis(a.u, b.u, c.u, material.wrapU), v = placedAxis(a.v, b.v, c.v, material.wrapV);
     return ImagedTriangle{.image = &images.images()[material.image],
                           .wraps = {uint32_t(material.wrapU), uint32_t(material.wrapV)},

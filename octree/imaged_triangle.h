@@ -21,7 +21,7 @@ struct ImagedTriangle {
     [[nodiscard]] glm::vec2 at(float weightB, float weightC) const { return place + weightB * toB + weightC * toC; }
 };
 
-/// Returns a triangle in its image; nothing where it has none, or no level of it is in memory. `corners`: its vertices
+/// Returns a triangle in its image; nothing where it has none, or that is not shown. `corners`: its vertices
 /// in the page, which may name materials that there are not. `images` must outlive the result.
 std::optional<ImagedTriangle> imagedTriangle(const ImageSet& images, const PageView& page, const Index3& corners);
 

@@ -72,19 +72,42 @@ int wholeBelow(float x) {
     return whole - (float(whole) > x ? 1 : 0);
 }
 
-/// Adds what a level shows at a point, between four texels.
-void addBilinear(const ColourTables& tables, glm::vec4& sum, const ImageSet::Level& level, ImageWraps wraps,
-                 glm::vec2 at, float weight) {
+/// Four texels about a point, and how far it is from the first towards the others.
+struct Quad {
+    uint32_t texels[4];
+    float fx, fy;
+};
+
+/// Finds those of a level; nothing where not all of their tiles are in memory.
+inline bool findQuad(const ImageSet::Level& level, ImageWraps wraps, glm::vec2 at, Quad& quad) {
     const int width = int(level.width), height = int(level.height);
     const float x = f32::boundedPlace(at.x * float(width) - 0.5f), y = f32::boundedPlace(at.y * float(height) - 0.5f);
     const int column = wholeBelow(x), row = wholeBelow(y);
-    const float fx = x - float(column), fy = y - float(row);
-    const glm::ivec2 columns = pairOf(column, width, wraps.u), rows = pairOf(row, height, wraps.v);
-    const uint32_t* const texels = level.texels.get();
-    const uint32_t* const upper = texels + size_t(rows[0]) * size_t(width);
-    const uint32_t* const lower = texels + size_t(rows[1]) * size_t(width);
-    add(tables, sum, {upper[columns[0]], upper[columns[1]], lower[columns[0]], lower[columns[1]]},
-        {weight * (1 - fy) * (1 - fx), weight * (1 - fy) * fx, weight * fy * (1 - fx), weight * fy * fx});
+    quad.fx = x - float(column), quad.fy = y - float(row);
+    const glm::uvec2 columns(pairOf(column, width, wraps.u)), rows(pairOf(row, height, wraps.v));
+    const uint32_t* const first = level.tileOf(columns[0], rows[0]);
+    if (first == nullptr) return false;
+    if (columns[0] >> level.log2Edge == columns[1] >> level.log2Edge &&
+        rows[0] >> level.log2Edge == rows[1] >> level.log2Edge) [[likely]] {
+        for (int i = 0; i < 4; ++i) quad.texels[i] = first[level.placeInTile(columns[i & 1], rows[i >> 1])];
+        return true;
+    }
+    for (int i = 0; i < 4; ++i) {
+        const uint32_t* const tile = level.tileOf(columns[i & 1], rows[i >> 1]);
+        if (tile == nullptr) return false;
+        quad.texels[i] = tile[level.placeInTile(columns[i & 1], rows[i >> 1])];
+    }
+    return true;
+}
+
+/// Adds what a level shows at a point, between four texels, or the next coarser one that is in memory there.
+void addBilinear(const ColourTables& tables, glm::vec4& sum, const ImageSet::Image& image, size_t level,
+                 ImageWraps wraps, glm::vec2 at, float weight) {
+    Quad quad;
+    while (!findQuad(image.levels[level], wraps, at, quad)) ++level;
+    add(tables, sum, quad.texels,
+        {weight * (1 - quad.fy) * (1 - quad.fx), weight * (1 - quad.fy) * quad.fx, weight * quad.fy * (1 - quad.fx),
+         weight * quad.fy * quad.fx});
 }
 
 }  // namespace
@@ -92,12 +115,12 @@ void addBilinear(const ColourTables& tables, glm::vec4& sum, const ImageSet::Lev
 glm::vec4 filteredColour(const ImageSet::Image& image, ImageWraps wraps, glm::vec2 at, const ImagePlaces& places) {
     const ColourTables& tables = ColourTables::get();
     const float part = 1 / float(places.count);
+    const size_t finer = image.finest + size_t(places.finer);
     glm::vec4 sum(0);
     for (int i = 0; i < places.count; ++i) {
         const glm::vec2 place = at + ((float(i) + 0.5f) * part - 0.5f) * places.along;
-        addBilinear(tables, sum, image.levels[size_t(places.finer)], wraps, place, (1 - places.coarser) * part);
-        if (places.coarser > 0)
-            addBilinear(tables, sum, image.levels[size_t(places.finer) + 1], wraps, place, places.coarser * part);
+        addBilinear(tables, sum, image, finer, wraps, place, (1 - places.coarser) * part);
+        if (places.coarser > 0) addBilinear(tables, sum, image, finer + 1, wraps, place, places.coarser * part);
     }
     if (!(sum.w > 0)) return glm::vec4(0);
     const float scale = 1 / sum.w;

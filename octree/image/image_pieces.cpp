@@ -20,6 +20,7 @@ Result<std::shared_ptr<const ImagePieces>> ImagePieces::read(const ByteReader& r
 
 ImagePieces::ImagePieces(ImageTables tables) : tables_(std::move(tables)) {
     places_.reserve(tables_.tiles.size());
+    numbers_.resize(tables_.tiles.size());
     for (const ImageRow& image : tables_.images) {
         levels_.push_back(vcp::levelsOf(image));
         const std::vector<ImageLevel>& levels = levels_.back();
@@ -30,7 +31,10 @@ ImagePieces::ImagePieces(ImageTables tables) : tables_(std::move(tables)) {
         for (uint32_t level = 0; level < first; ++level) pieces += piecesOfLevel(levels[level]);
         firstPiece_.push_back(firstPiece_.back() + pieces);
         for (auto level = levels.rbegin(); level != levels.rend(); ++level)
-            for (const glm::uvec2 tile : tileOrder(*level)) places_.push_back({uint16_t(tile.x), uint16_t(tile.y)});
+            for (uint32_t number = 0; const glm::uvec2 tile : tileOrder(*level)) {
+                numbers_[level->firstTile + uint64_t{tile.y} * level->tilesX() + tile.x] = number++;
+                places_.push_back({uint16_t(tile.x), uint16_t(tile.y)});
+            }
     }
 }
 
@@ -64,17 +68,29 @@ ImagePiece ImagePieces::piece(uint64_t number) const {
     return piece;
 }
 
-/// Returns the size of tile `i` of a piece. The first piece of an image has a level a tile, the coarsest first.
-glm::uvec2 ImagePieces::sizeOf(const ImagePiece& piece, uint64_t i) const {
+ImagePieces::TilePlace ImagePieces::placeOf(const ImagePiece& piece, uint64_t i) const {
     const std::vector<ImageLevel>& levels = levels_[piece.image];
+    // The first piece of an image has a level a tile, the coarsest first.
     const bool isFirst = piece.level == firstLevel_[piece.image];
-    const ImageLevel& level = isFirst ? levels[levels.size() - 1 - i] : levels[piece.level];
-    return level.sizeOf(placeOf(piece.firstTile + i));
+    const auto level = uint32_t(isFirst ? levels.size() - 1 - i : piece.level);
+    const Place& place = places_[piece.firstTile + i];
+    const glm::uvec2 tile(place.x, place.y);
+    return {level, tile, levels[level].sizeOf(tile)};
+}
+
+uint64_t ImagePieces::pieceOf(uint32_t image, uint32_t level, glm::uvec2 tile) const {
+    const uint64_t first = piecesOf(image, level).first;
+    if (level >= firstLevel_[image]) return first;
+    const ImageLevel& of = levels_[image][level];
+    return first + numbers_[of.firstTile + uint64_t{tile.y} * of.tilesX() + tile.x] / pieceTiles(of);
 }
 
 uint64_t ImagePieces::texelsOf(const ImagePiece& piece) const {
     uint64_t texels = 0;
-    for (uint64_t i = 0; i < piece.tiles; ++i) texels += uint64_t{sizeOf(piece, i).x} * sizeOf(piece, i).y;
+    for (uint64_t i = 0; i < piece.tiles; ++i) {
+        const glm::uvec2 size = placeOf(piece, i).size;
+        texels += uint64_t{size.x} * size.y;
+    }
     return texels;
 }
 
@@ -89,7 +105,7 @@ Result<std::vector<uint32_t>> ImagePieces::readPiece(const ByteReader& reader, u
     std::vector<uint32_t> texels(texelsOf(piece));
     std::span<uint32_t> rest(texels);
     for (uint64_t i = 0; i < piece.tiles; ++i) {
-        const glm::uvec2 size = sizeOf(piece, i);
+        const glm::uvec2 size = placeOf(piece, i).size;
         const size_t count = size_t{size.x} * size.y;
         VCP_TRY(decodeTile(reader.name(), tables_, tables_.images[piece.image], stored, piece.firstTile + i, size,
                            rest.first(count)));

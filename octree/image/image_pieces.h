@@ -39,8 +39,15 @@ public:
     [[nodiscard]] Range piecesOf(uint32_t image, uint32_t level) const;
     /// Returns the finest level of the image's first piece, which has all that are coarser.
     [[nodiscard]] uint32_t firstLevel(uint32_t image) const { return firstLevel_[image]; }
-    /// Column and row of a tile in its level.
-    [[nodiscard]] glm::uvec2 placeOf(uint64_t tile) const { return {places_[tile].x, places_[tile].y}; }
+    /// Where a tile of a piece lies.
+    struct TilePlace {
+        uint32_t level = 0;
+        glm::uvec2 tile{0}, size{0};  ///< column and row; texels along both axes
+    };
+    /// `i`: number of the tile among those of the piece, in the order of their texels.
+    [[nodiscard]] TilePlace placeOf(const ImagePiece& piece, uint64_t i) const;
+    /// Returns the piece that has a level's tile.
+    [[nodiscard]] uint64_t pieceOf(uint32_t image, uint32_t level, glm::uvec2 tile) const;
     /// Returns the texels of its tiles.
     [[nodiscard]] uint64_t texelsOf(const ImagePiece& piece) const;
     /// Where a piece is in the file; pieces follow each other.
@@ -55,8 +62,6 @@ public:
     Result<std::vector<uint32_t>> readPiece(const ByteReader& reader, uint64_t number) const;
 
 private:
-    [[nodiscard]] glm::uvec2 sizeOf(const ImagePiece& piece, uint64_t i) const;
-
     struct Place {
         uint16_t x, y;
     };
@@ -64,7 +69,8 @@ private:
     std::vector<std::vector<ImageLevel>> levels_;
     std::vector<uint32_t> firstLevel_;
     std::vector<uint64_t> firstPiece_{0};  // of each image, and the end of the last
-    std::vector<Place> places_;
+    std::vector<Place> places_;      // of each tile in its level
+    std::vector<uint32_t> numbers_;  // of a level's tiles in the file's order, row by row
 };
 
 }  // namespace vcp

@@ -1,53 +1,44 @@
 #include "octree/image/image_set.h"
 
+#include <algorithm>
 #include <utility>
 
 namespace vcp {
 
+ImageSet::Level::Level(const ImageLevel& level)
+    : width(level.width),
+      height(level.height),
+      log2Edge(uint32_t(std::countr_zero(level.tileEdge))),
+      tilesX(level.tilesX()),
+      tiles(level.tiles()) {}
+
 ImageSet::ImageSet(const ImageTables& tables) : materials_(tables.materials) {
-    for (const ImageRow& row : tables.images) images_.push_back({row.width, row.height, row.levels, {}});
-}
-
-uint64_t ImageSet::bytes() const {
-    uint64_t bytes = 0;
-    for (const Image& image : images_)
-        for (const Level& level : image.levels) bytes += level.bytes();
-    return bytes;
-}
-
-void ImageSet::add(uint32_t image, Level level) {
-    --images_[image].finest;
-    images_[image].levels.insert(images_[image].levels.begin(), std::move(level));
-}
-
-void ImageSet::drop(uint32_t image, uint32_t finest) {
-    while (images_[image].finest < finest) {
-        images_[image].levels.erase(images_[image].levels.begin());
-        ++images_[image].finest;
+    for (const ImageRow& row : tables.images) {
+        Image& image = images_.emplace_back(row.width, row.height, row.levels);
+        for (const ImageLevel& level : levelsOf(row)) image.levels.emplace_back(level);
     }
 }
 
-std::vector<uint32_t> finestWithin(std::span<const ImageRow> images, std::vector<uint32_t> finest,
-                                   const std::vector<uint32_t>& coarsest, uint64_t mostBytes) {
-    std::vector<std::vector<ImageLevel>> levels;
-    uint64_t bytes = 0;
-    for (size_t i = 0; i < images.size(); ++i) {
-        levels.push_back(levelsOf(images[i]));
-        for (size_t l = finest[i]; l < levels.back().size(); ++l) bytes += levels.back()[l].texels() * sizeof(uint32_t);
-    }
-    // What the finest level of an image takes that may go.
-    const auto largest = [&](size_t i) {
-        return finest[i] < coarsest[i] ? levels[i][finest[i]].texels() * sizeof(uint32_t) : 0;
+uint64_t ImageSet::Level::texelsOf(size_t i) const {
+    const uint32_t edge = 1u << log2Edge, x = uint32_t(i % tilesX) * edge, y = uint32_t(i / tilesX) * edge;
+    return uint64_t{std::min(edge, width - x)} * std::min(edge, height - y);
+}
+
+void ImageSet::set(uint32_t number, uint32_t level, glm::uvec2 tile, Tile texels) {
+    Image& image = images_[number];
+    Level& to = image.levels[level];
+    const size_t at = size_t{tile.y} * to.tilesX + tile.x;
+    const uint64_t bytes = to.texelsOf(at) * sizeof(uint32_t);
+    Tile& there = to.tiles[at];
+    bytes_ += (texels ? bytes : 0) - (there ? bytes : 0);
+    there = std::move(texels);
+    const auto isEmpty = [](const Level& one) {
+        return std::all_of(one.tiles.begin(), one.tiles.end(), [](const Tile& each) { return each == nullptr; });
     };
-    while (bytes > mostBytes) {
-        size_t image = 0;
-        for (size_t i = 1; i < images.size(); ++i)
-            if (largest(i) > largest(image)) image = i;
-        if (images.empty() || largest(image) == 0) break;
-        bytes -= largest(image);
-        ++finest[image];
-    }
-    return finest;
+    if (there)
+        image.finest = std::min(image.finest, level);
+    else
+        while (image.finest < image.levels.size() && isEmpty(image.levels[image.finest])) ++image.finest;
 }
 
 }  // namespace vcp

@@ -1,6 +1,8 @@
-// The levels of a file's images that are in memory, decoded, for whoever looks colours up.
+// The tiles of a file's images that are in memory, decoded, for whoever looks colours up.
 #pragma once
 
+#include <algorithm>
+#include <bit>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -13,41 +15,54 @@ namespace vcp {
 /// Copies share the texels, which do not change.
 class ImageSet {
 public:
-    /// A level that is in memory.
-    struct Level {
-        uint32_t width = 1, height = 1;            ///< texels
-        std::shared_ptr<const uint32_t[]> texels;  ///< RGBA8, row by row
+    /// The texels of a tile, RGBA8, row by row; null where it is not in memory.
+    using Tile = std::shared_ptr<const uint32_t[]>;
 
-        [[nodiscard]] uint64_t bytes() const { return uint64_t{width} * height * sizeof(uint32_t); }
+    struct Level {
+        explicit Level(const ImageLevel& level);
+
+        uint32_t width, height;   ///< texels
+        uint32_t log2Edge;        ///< of its tiles
+        uint32_t tilesX;          ///< tiles of a row
+        std::vector<Tile> tiles;  ///< row by row
+
+        /// Returns the texels of the tile that has a texel; null where they are not in memory.
+        [[nodiscard]] const uint32_t* tileOf(uint32_t column, uint32_t row) const {
+            return tiles[size_t{row >> log2Edge} * tilesX + (column >> log2Edge)].get();
+        }
+        /// Returns how many texels a tile has. `i`: its number, row by row.
+        [[nodiscard]] uint64_t texelsOf(size_t i) const;
+        /// Returns where a texel is in its tile.
+        [[nodiscard]] size_t placeInTile(uint32_t column, uint32_t row) const {
+            const uint32_t inTile = (1u << log2Edge) - 1;
+            const uint32_t before = column & ~inTile;
+            return size_t{row & inTile} * std::min(inTile + 1, width - before) + (column & inTile);
+        }
     };
+    /// An image is shown where its coarsest level is in memory. What of a finer level is not, is seen in a coarser one.
     struct Image {
         uint32_t width = 1, height = 1;  ///< texels of level 0
-        uint32_t finest = 0;        ///< number of the finest level that is in memory; where there is none, of levels
-        std::vector<Level> levels;  ///< from that one on
+        uint32_t finest = 0;             ///< number of the finest level of which something is in memory
+        std::vector<Level> levels;       ///< all, whatever is in memory; the finest is level 0
+
+        [[nodiscard]] bool isShown() const { return levels.back().tiles.front() != nullptr; }
     };
 
     ImageSet() = default;
-    /// Images without a level.
+    /// Images without a tile.
     explicit ImageSet(const ImageTables& tables);
 
     [[nodiscard]] std::span<const Image> images() const { return images_; }
     [[nodiscard]] std::span<const MaterialRow> materials() const { return materials_; }
-    [[nodiscard]] uint64_t bytes() const;
+    [[nodiscard]] uint64_t bytes() const { return bytes_; }
 
-    /// Adds the level that is next finer than those there are.
-    void add(uint32_t image, Level level);
-    /// Takes away the levels of an image that are finer than `finest`.
-    void drop(uint32_t image, uint32_t finest);
+    /// Puts a tile in its place, or takes it away (null). `tile`: its column and row.
+    void set(uint32_t image, uint32_t level, glm::uvec2 tile, Tile texels);
 
 private:
     std::vector<Image> images_;
     std::vector<MaterialRow> materials_;
+    uint64_t bytes_ = 0;
 };
-
-/// Coarsens what images have until all levels from there on take `mostBytes` together, or none may go: the largest ones
-/// go first. `finest`: for each image, the number of its finest level, that of levels where it has none; `coarsest`:
-/// the most that it may become.
-std::vector<uint32_t> finestWithin(std::span<const ImageRow> images, std::vector<uint32_t> finest,
-                                   const std::vector<uint32_t>& coarsest, uint64_t mostBytes);
 
 }  // namespace vcp

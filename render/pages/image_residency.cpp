@@ -31,32 +31,46 @@ double pixelEdgeAt(const Dataset& dataset, const PageEntry& page, const Selectio
 ImageResidency::ImageResidency(std::shared_ptr<const ImagePieces> pieces, uint64_t mostBytes)
     : assembly_(std::move(pieces)),
       mostBytes_(mostBytes),
-      planned_(nothing()),
-      readable_(images().size()),
-      shown_(std::make_shared<const ImageSet>(assembly_.set())) {}
+      planned_(this->pieces().count()),
+      unreadable_(this->pieces().count()),
+      needed_(this->pieces().count()),
+      shown_(std::make_shared<const ImageSet>(assembly_.set())),
+      shownPieces_(this->pieces().count()) {
+    for (uint64_t piece = 0; piece < planned_.size(); ++piece)
+        bytes_.push_back(uint32_t(this->pieces().texelsOf(this->pieces().piece(piece)) * sizeof(uint32_t)));
+}
 
-std::vector<uint32_t> ImageResidency::nothing() const {
-    std::vector<uint32_t> levels;
-    for (const ImageRow& image : images()) levels.push_back(image.levels);
-    return levels;
+ImageResidency::Shown ImageResidency::shownOf(const ImageNeed& need) const {
+    Shown shown{need.image, need.texelsPerCell, {}, {}};
+    for (uint32_t level = 0; level <= pieces().firstLevel(need.image); ++level) {
+        const auto added = piecesNeeded(pieces(), need, level);
+        shown.begin.push_back(uint32_t(shown.pieces.size()));
+        shown.pieces.insert(shown.pieces.end(), added.begin(), added.end());
+    }
+    return shown;
 }
 
 void ImageResidency::learn(uint64_t page, std::vector<ImageNeed> needs) {
-    if (!needs.empty()) needs_[page] = std::move(needs);
+    if (needs.empty()) return;
+    std::vector<Shown>& shown = pages_[page];
+    shown.clear();
+    for (const ImageNeed& need : needs) shown.push_back(shownOf(need));
 }
 
 void ImageResidency::look(const Dataset& dataset, const SelectionView& view, const std::vector<uint64_t>& cut,
                           ViewNumber number) {
     Look& look = looks_[number];
-    if (look.view == view && look.cut == cut && !look.finest.empty()) return;
-    look = {view, cut, nothing()};
+    if (look.view == view && look.cut == cut && !look.needed.empty()) return;
+    look = {view, cut, std::vector<bool>(pieces().count())};
     for (const uint64_t page : cut) {
-        const auto needs = needs_.find(page);
-        if (needs == needs_.end() || !inFrustum(dataset, dataset.pages[page], view)) continue;
+        const auto shown = pages_.find(page);
+        if (shown == pages_.end() || !inFrustum(dataset, dataset.pages[page], view)) continue;
         const double edge = pixelEdgeAt(dataset, dataset.pages[page], view);
-        for (const ImageNeed& need : needs->second) {
-            uint32_t& finest = look.finest[need.image];
-            finest = std::min(finest, finestNeeded(need.texelsPerCell, edge, images()[need.image].levels));
+        for (const Shown& of : shown->second) {
+            const uint32_t finest =
+                finestNeeded(of.texelsPerCell, edge, uint32_t(pieces().levelsOf(of.image).size()));
+            const uint32_t begin = of.begin[std::min(size_t{finest}, of.begin.size() - 1)];
+            for (size_t i = begin; i < of.pieces.size(); ++i) look.needed[of.pieces[i]] = true;
         }
     }
     replan();
@@ -73,38 +87,81 @@ void ImageResidency::replan() {
 
 void ImageResidency::take(uint64_t piece, std::span<const uint32_t> texels) {
     // What is not planned any more has no room.
-    const ImagePiece what = assembly_.pieces().piece(piece);
-    const uint32_t planned = planned_[what.image];
-    const bool isFirst = what.level == assembly_.pieces().firstLevel(what.image);
-    if (planned == images()[what.image].levels || (what.level < planned && !isFirst)) return;
+    if (!planned_[piece]) return;
     assembly_.take(piece, texels);
-    assembly_.drop(what.image, planned);
     isIdle_ = false;
 }
 
 void ImageResidency::giveUp(uint64_t piece) {
-    const ImagePiece what = assembly_.pieces().piece(piece);
-    // Some levels of a first piece may be there.
-    const bool isFirst = what.level == assembly_.pieces().firstLevel(what.image);
-    const uint32_t next = isFirst ? assembly_.set().images()[what.image].finest : what.level + 1;
-    readable_[what.image] = std::max(readable_[what.image], next);
+    const ImagePiece what = pieces().piece(piece);
+    unreadable_[piece] = true;
+    if (what.level == pieces().firstLevel(what.image)) {
+        const auto [first, end] = pieces().piecesOf(what.image, 0);
+        std::fill(unreadable_.begin() + std::ptrdiff_t(piece), unreadable_.begin() + std::ptrdiff_t(end), true);
+    }
     replan();
 }
 
-/// Chooses the levels that are to be in memory, and drops those that have no room beside them.
+/// Chooses the pieces that are to be in memory, and drops those that have no room beside them.
 void ImageResidency::plan() {
-    std::vector<uint32_t> needed = nothing(), kept, coarsest;
-    for (const auto& [number, look] : looks_)
-        for (size_t i = 0; i < needed.size(); ++i)
-            needed[i] = std::min(needed[i], std::max(look.finest[i], readable_[i]));
-    for (size_t i = 0; i < needed.size(); ++i) {
-        kept.push_back(std::min(needed[i], assembly_.set().images()[i].finest));
-        coarsest.push_back(std::max(needed[i], images()[i].levels - 1));
+    ++plans_;
+    std::fill(planned_.begin(), planned_.end(), false);
+    for (uint64_t piece = 0; piece < planned_.size(); ++piece) {
+        for (const auto& [number, look] : looks_) planned_[piece] = planned_[piece] || look.needed[piece];
+        if (planned_[piece]) needed_[piece] = plans_;
+        planned_[piece] = planned_[piece] && !unreadable_[piece];
     }
-    // What no view needs goes first.
-    kept = finestWithin(images(), std::move(kept), needed, mostBytes_);
-    planned_ = finestWithin(images(), std::move(kept), coarsest, mostBytes_);
-    for (uint32_t i = 0; i < planned_.size(); ++i) assembly_.drop(i, planned_[i]);
+    leaveOut();
+    makeRoom();
+}
+
+/// Takes levels out of the plan until it is within what is allowed: again and again, of the finest that each image is
+/// planned to have, the one that takes the most.
+void ImageResidency::leaveOut() {
+    struct Planned {
+        uint32_t image, level;
+        uint64_t bytes;
+    };
+    std::vector<Planned> levels;  // image by image, the finest first
+    uint64_t bytes = 0;
+    for (uint32_t image = 0; image < pieces().tables().images.size(); ++image)
+        for (uint32_t level = 0; level <= pieces().firstLevel(image); ++level) {
+            const auto [first, end] = pieces().piecesOf(image, level);
+            uint64_t taken = 0;
+            for (uint64_t piece = first; piece < end; ++piece)
+                if (planned_[piece]) taken += bytes_[piece];
+            if (taken > 0) levels.push_back({image, level, taken});
+            bytes += taken;
+        }
+    while (bytes > mostBytes_) {
+        auto most = levels.begin();
+        for (auto level = levels.begin(); level != levels.end(); ++level)
+            if ((level == levels.begin() || level->image != (level - 1)->image) && level->bytes > most->bytes)
+                most = level;
+        const auto [first, end] = pieces().piecesOf(most->image, most->level);
+        std::fill(planned_.begin() + std::ptrdiff_t(first), planned_.begin() + std::ptrdiff_t(end), false);
+        bytes -= most->bytes;
+        levels.erase(most);
+    }
+}
+
+/// Drops pieces that are not planned until the others have room.
+void ImageResidency::makeRoom() {
+    uint64_t bytes = 0;
+    std::vector<uint64_t> others;
+    for (uint64_t piece = 0; piece < planned_.size(); ++piece) {
+        if (planned_[piece] || assembly_.has(piece)) bytes += bytes_[piece];
+        if (!planned_[piece] && assembly_.has(piece)) others.push_back(piece);
+    }
+    // Pieces of one plan go with their highest numbers first, since finer levels have these.
+    std::sort(others.begin(), others.end(), [&](uint64_t a, uint64_t b) {
+        return needed_[a] != needed_[b] ? needed_[a] < needed_[b] : a > b;
+    });
+    for (auto piece = others.begin(); piece != others.end() && bytes > mostBytes_; ++piece) {
+        assembly_.drop(*piece);
+        bytes -= bytes_[*piece];
+        dropped_ = dropped_ || shownPieces_[*piece];
+    }
 }
 
 std::vector<Wish> ImageResidency::wishes() {
@@ -112,61 +169,63 @@ std::vector<Wish> ImageResidency::wishes() {
     const bool moved = std::exchange(stale_, false);
     if (moved) plan();
     std::vector<Wish> wishes;
-    const ImagePieces& pieces = assembly_.pieces();
-    const ImageSet& there = assembly_.set();
-    bool dropped = false;
-    for (uint32_t image = 0; image < planned_.size(); ++image) {
-        const uint32_t finest = there.images()[image].finest, planned = planned_[image];
-        dropped = dropped || shown_->images()[image].finest < finest;
-        if (finest <= planned) continue;
-        const uint32_t first = pieces.firstLevel(image), last = std::min(planned, first);
-        uint32_t level = std::min(finest - 1, first) + 1;
-        for (uint32_t ahead = 0; ahead < kLevelsAhead && level-- > last; ++ahead) {
-            // Each level that is missing is twice as wide a blur; with the first piece comes the coarsest.
-            const uint32_t missing = (level == first ? images()[image].levels : level + 1) - planned;
-            const double urgency = std::ldexp(1.0, int(missing) - kUrgentLevels);
-            const auto [begin, end] = pieces.piecesOf(image, level);
-            for (uint64_t piece = begin; piece < end; ++piece)
-                if (!assembly_.has(piece)) wishes.push_back({Request::imagePiece(piece), urgency});
-        }
-    }
+    for (uint32_t image = 0; image < pieces().tables().images.size(); ++image) addWishes(image, wishes);
     const bool isWhole = wishes.empty() && !moved;
-    if (isWhole || dropped || 2 * there.bytes() >= 3 * shown_->bytes()) show();
+    if (isWhole || dropped_ || 2 * assembly_.set().bytes() >= 3 * shown_->bytes()) show();
     isIdle_ = isWhole;
     return wishes;
 }
 
-/// Shows the levels that are there.
-void ImageResidency::show() {
-    const auto levels = [](const ImageSet& set) {
-        std::vector<const void*> all;
-        for (const ImageSet::Image& image : set.images())
-            all.push_back(image.levels.empty() ? nullptr : image.levels.front().texels.get());
-        return all;
+/// Wishes for what is missing of the coarsest levels of an image that are not whole.
+void ImageResidency::addWishes(uint32_t image, std::vector<Wish>& wishes) const {
+    const uint32_t first = pieces().firstLevel(image);
+    const auto planned = [&](uint32_t level) {
+        const auto [begin, end] = pieces().piecesOf(image, level);
+        for (uint64_t piece = begin; piece < end; ++piece)
+            if (planned_[piece]) return true;
+        return false;
     };
-    if (levels(assembly_.set()) == levels(*shown_)) return;
+    uint32_t finest = 0;
+    while (finest <= first && !planned(finest)) ++finest;
+    uint32_t ahead = 0;
+    for (uint32_t level = first + 1; level-- > finest && ahead < kLevelsAhead;) {
+        // Each level that is missing is twice as wide a blur; with the first piece comes the coarsest.
+        const auto levels = uint32_t(pieces().levelsOf(image).size());
+        const uint32_t missing = (level == first ? levels : level + 1) - finest;
+        const double urgency = std::ldexp(1.0, int(missing) - kUrgentLevels);
+        const size_t before = wishes.size();
+        const auto [begin, end] = pieces().piecesOf(image, level);
+        for (uint64_t piece = begin; piece < end; ++piece)
+            if (planned_[piece] && !assembly_.has(piece)) wishes.push_back({Request::imagePiece(piece), urgency});
+        ahead += ahead > 0 || wishes.size() > before ? 1 : 0;
+    }
+}
+
+/// Shows what is there.
+void ImageResidency::show() {
+    dropped_ = false;
+    std::vector<bool> there(planned_.size());
+    for (uint64_t piece = 0; piece < there.size(); ++piece) there[piece] = assembly_.has(piece);
+    if (there == shownPieces_) return;
+    shownPieces_ = std::move(there);
     shown_ = std::make_shared<const ImageSet>(assembly_.set());
     ++version_;
 }
 
-template <class Finest>
-bool ImageResidency::lacks(ViewNumber number, const Finest& finest) const {
+bool ImageResidency::isLimited(ViewNumber number) const {
     const auto look = looks_.find(number);
     if (look == looks_.end()) return false;
-    for (size_t i = 0; i < planned_.size(); ++i)
-        if (finest(i) > std::max(look->second.finest[i], readable_[i])) return true;
+    for (uint64_t piece = 0; piece < planned_.size(); ++piece)
+        if (look->second.needed[piece] && !planned_[piece] && !unreadable_[piece]) return true;
     return false;
 }
 
-bool ImageResidency::isLimited(ViewNumber number) const {
-    return lacks(number, [&](size_t i) { return planned_[i]; });
-}
-
 bool ImageResidency::isComplete(ViewNumber number) const {
-    return !lacks(number, [&](size_t i) {
-        const uint32_t shown = shown_->images()[i].finest;
-        return shown > planned_[i] ? shown : 0;
-    });
+    const auto look = looks_.find(number);
+    if (look == looks_.end()) return true;
+    for (uint64_t piece = 0; piece < planned_.size(); ++piece)
+        if (look->second.needed[piece] && planned_[piece] && !shownPieces_[piece]) return false;
+    return true;
 }
 
 }  // namespace vcp

@@ -1,14 +1,15 @@
-// Which levels of a file's images are in memory: those that the pages in views need, coarse ones first. Pure: no
+// Which pieces of a file's images are in memory: those that the pages in views need, coarse levels first. Pure: no
 // threads, no clock.
 //
-// A view needs of an image the finest level that a pixel can read on one of its pages: from how finely the page's
-// triangles show the image (octree/image_needs.h) and the point of the page's box that is nearest to the eye. Images
-// that no page shows need nothing. Where all that views need takes more than is allowed, the finest levels of the
-// largest images are left out; levels that no view needs any more stay while there is room.
+// A view needs of an image what its pages show of it, from the finest level on that a pixel can read there: from how
+// finely the page's triangles show the image, and where (octree/image_needs.h), and the point of the page's box that is
+// nearest to the eye. Images that no page shows need nothing. Where all that views need takes more than is allowed, the
+// finest levels of those that take the most are left out; what no view needs any more stays while there is room, and
+// what was needed last stays longest.
 //
-// What is drawn is a set of whole levels, which changes by bounds: with the first level, once half as many bytes came
-// as there were, when all came while the views stand still, and when some go. So for a still view, whoever copies each
-// set copies at most four times what there is in the end.
+// What is drawn is a set, which changes by bounds: with the first piece, once half as many bytes came as there were,
+// when all came while the views stand still, and when some go. So for a still view, whoever copies each set copies at
+// most four times what there is in the end.
 #pragma once
 
 #include <map>
@@ -38,12 +39,13 @@ public:
     void forgetView(ViewNumber number);
     /// Takes in the texels of a piece that was wished for.
     void take(uint64_t piece, std::span<const uint32_t> texels);
-    /// A piece cannot be read: its level and finer ones are not wished for any more.
+    /// A piece cannot be read: it is not wished for any more. What it would show is seen in a coarser level; without the
+    /// first piece of an image, nothing of it is.
     void giveUp(uint64_t piece);
     /// Chooses what is to be in memory, and returns the pieces to read, by their number.
     std::vector<Wish> wishes();
 
-    /// The levels to draw from; the same until the next wishes(). Never null.
+    /// What to draw from; the same until the next wishes(). Never null.
     [[nodiscard]] const std::shared_ptr<const ImageSet>& shown() const { return shown_; }
     /// Counts the sets.
     [[nodiscard]] uint64_t version() const { return version_; }
@@ -51,34 +53,45 @@ public:
     [[nodiscard]] bool isComplete(ViewNumber number = 0) const;
     /// Whether the view needs more than is allowed.
     [[nodiscard]] bool isLimited(ViewNumber number = 0) const;
-    /// The most bytes that levels take.
+    /// The most bytes that images take.
     [[nodiscard]] uint64_t mostBytes() const { return mostBytes_; }
 
 private:
+    /// What a page shows of an image.
+    struct Shown {
+        uint32_t image = 0;
+        float texelsPerCell = 0;
+        std::vector<uint32_t> pieces;  // of all levels, the finest first
+        std::vector<uint32_t> begin;   // of each level among them, up to that of the first piece
+    };
     struct Look {
         SelectionView view;
         std::vector<uint64_t> cut;
-        std::vector<uint32_t> finest;  // for each image, the number of the finest level needed; of levels: none
+        std::vector<bool> needed;  // pieces
     };
-    [[nodiscard]] std::span<const ImageRow> images() const { return assembly_.pieces().tables().images; }
-    /// Returns, for each image, that no level is needed.
-    [[nodiscard]] std::vector<uint32_t> nothing() const;
-    /// Whether finest(image), a number of a level, is coarser for some image than the view needs and can be read.
-    template <class Finest>
-    [[nodiscard]] bool lacks(ViewNumber number, const Finest& finest) const;
+    [[nodiscard]] const ImagePieces& pieces() const { return assembly_.pieces(); }
+    [[nodiscard]] Shown shownOf(const ImageNeed& need) const;
     void replan();
     void plan();
+    void leaveOut();
+    void makeRoom();
+    void addWishes(uint32_t image, std::vector<Wish>& wishes) const;
     void show();
 
     ImageAssembly assembly_;
     const uint64_t mostBytes_;
-    std::unordered_map<uint64_t, std::vector<ImageNeed>> needs_;  // by page
+    std::vector<uint32_t> bytes_;  // of each piece
+    std::unordered_map<uint64_t, std::vector<Shown>> pages_;
     std::map<ViewNumber, Look> looks_;
-    std::vector<uint32_t> planned_;   // for each image, the finest level that is to be in memory
-    std::vector<uint32_t> readable_;  // for each image, the finest level that can be read
-    bool stale_ = false;              // planned_ is of other looks
-    bool isIdle_ = false;             // all that is planned is shown
+    std::vector<bool> planned_;     // pieces that are to be in memory
+    std::vector<bool> unreadable_;  // pieces
+    std::vector<uint64_t> needed_;  // of each piece, the number of the plan that needed it last
+    uint64_t plans_ = 0;
+    bool stale_ = false;    // planned_ is of other looks
+    bool dropped_ = false;  // something that is shown went
+    bool isIdle_ = false;   // all that is planned is shown
     std::shared_ptr<const ImageSet> shown_;
+    std::vector<bool> shownPieces_;
     uint64_t version_ = 0;
 };
 

@@ -11,26 +11,47 @@ namespace {
 // What the tables of images may take beside their texels.
 constexpr uint64_t kTableBytes = 1ull << 20;
 
-/// Returns the tables, which the texels follow, image by image (images.glsl).
-std::vector<uint32_t> tableWords(const ImageSet& set) {
-    std::vector<uint32_t> words{uint32_t(set.materials().size()), 0, 0, 0};
-    std::vector<uint32_t> placeOf;
-    auto end = uint32_t(4 + 4 * set.materials().size());
-    for (const ImageSet::Image& image : set.images()) {
-        placeOf.push_back(image.levels.empty() ? 0 : end);
-        end += uint32_t(4 + 4 * image.levels.size());
+/// Where the words of images stand: those that all sets of a file share, which the texels follow.
+struct Layout {
+    explicit Layout(const ImageSet& set) : tables(uint32_t(4 + 4 * set.materials().size())) {
+        for (const ImageSet::Image& image : set.images()) {
+            images.push_back(tables);
+            tables += uint32_t(4 + 4 * image.levels.size());
+        }
+        for (const ImageSet::Image& image : set.images())
+            for (const ImageSet::Level& level : image.levels) {
+                tiles.push_back(tables);
+                tables += uint32_t(level.tiles.size());
+            }
     }
+
+    std::vector<uint32_t> images;  // word of each image
+    std::vector<uint32_t> tiles;   // of the first tile of each level, image by image
+    uint32_t tables;               // how many words there are before the texels
+};
+/// Returns the tables (images.glsl), and puts the texels that follow them, tile by tile, into `parts`.
+std::vector<uint32_t> tableWords(const ImageSet& set, std::vector<std::span<const std::byte>>& parts) {
+    const Layout layout(set);
+    std::vector<uint32_t> words{uint32_t(set.materials().size()), 0, 0, 0};
     for (const MaterialRow& material : set.materials())
-        words.insert(words.end(), {placeOf[material.image], material.factor,
-                                   uint32_t(material.wrapU) | uint32_t(material.wrapV) << 8, 0});
-    uint64_t texels = end;
+        words.insert(words.end(),
+                     {set.images()[material.image].isShown() ? layout.images[material.image] : 0, material.factor,
+                      uint32_t(material.wrapU) | uint32_t(material.wrapV) << 8, 0});
+    size_t number = 0;
     for (const ImageSet::Image& image : set.images()) {
         words.insert(words.end(), {image.width, image.height, image.finest, uint32_t(image.levels.size())});
-        for (const ImageSet::Level& level : image.levels) {
-            words.insert(words.end(), {level.width, level.height, uint32_t(texels), 0});
-            texels += level.bytes() / sizeof(uint32_t);
-        }
+        for (const ImageSet::Level& level : image.levels)
+            words.insert(words.end(), {level.width, level.height, layout.tiles[number++], level.log2Edge});
     }
+    uint64_t end = layout.tables;
+    for (const ImageSet::Image& image : set.images())
+        for (const ImageSet::Level& level : image.levels)
+            for (size_t i = 0; i < level.tiles.size(); ++i) {
+                const uint64_t texels = level.tiles[i] ? level.texelsOf(i) : 0;
+                words.push_back(texels > 0 ? uint32_t(end) : 0);
+                if (texels > 0) parts.push_back(std::as_bytes(std::span(level.tiles[i].get(), texels)));
+                end += texels;
+            }
     return words;
 }
 
@@ -42,11 +63,9 @@ uint64_t mostImageBytes(const Device& device) {
 }
 
 Result<Buffer> uploadImages(Device& device, const ImageSet& images) {
-    const std::vector<uint32_t> tables = tableWords(images);
-    std::vector<std::span<const std::byte>> parts{std::as_bytes(std::span(tables))};
-    for (const ImageSet::Image& image : images.images())
-        for (const ImageSet::Level& level : image.levels)
-            parts.push_back({reinterpret_cast<const std::byte*>(level.texels.get()), level.bytes()});
+    std::vector<std::span<const std::byte>> parts(1);
+    const std::vector<uint32_t> tables = tableWords(images, parts);
+    parts.front() = std::as_bytes(std::span(tables));
     const uint64_t bytes = parts.front().size() + images.bytes(), most = device.limits().maxStorageBufferRange;
     if (bytes > most)
         return Error{

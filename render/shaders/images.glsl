@@ -2,11 +2,13 @@
 // them. The words of the images (render/passes/image_words.h):
 //
 //   4 words            the number of materials; 0
-//   4 words a material where its image begins, 0 where no level of it is here; RGBA8 that multiplies what the image
-//                      shows; how it goes on beyond its edges, along u and, from bit 8 on, along v; 0
-//   4 words an image   width and height of its level 0; number of its finest level here, and how many there are from
-//                      that one on; then 4 words a level: width, height, its first texel, 0
-//   1 word a texel     RGBA8, row by row
+//   4 words a material where its image begins, 0 where it is not shown; RGBA8 that multiplies what the image shows; how
+//                      it goes on beyond its edges, along u and, from bit 8 on, along v; 0
+//   4 words an image   width and height of its level 0; number of the finest level of which something is here, and how
+//                      many levels it has; then 4 words a level: width, height, the word of its first tile, log2 of the
+//                      edge of its tiles
+//   1 word a tile      where its texels begin, 0 where it is not here; row by row
+//   1 word a texel     RGBA8, row by row of a tile
 #include "octree/shared/image_lookup.h"
 
 uvec4 imageRecord(uint word) {
@@ -65,39 +67,66 @@ float storedOfLight(float light) { return light <= 0.0031308 ? light * 12.92 : 1
 
 // Returns the light of a texel times its alpha, and that, both times a weight.
 vec4 weightedTexel(uint word, float weight) {
-    vec4 texel = unpackUnorm4x8(imageWords[word]);
+    vec4 texel = unpackUnorm4x8(word);
     weight *= texel.w;
     return vec4(lightOfStored(texel.x), lightOfStored(texel.y), lightOfStored(texel.z), 1.0) * weight;
 }
 
-// Returns what a level shows at a point, between four texels, times a weight.
-vec4 bilinearLight(uvec4 level, ImagedTriangle t, vec2 at, float weight) {
+// Returns the word of the texels of the tile that has a texel of a level; 0 where it is not here.
+uint tileOf(uvec4 level, ivec2 texel) {
+    uint tilesX = (level.x + (1u << level.w) - 1u) >> level.w;
+    return imageWords[level.z + (uint(texel.y) >> level.w) * tilesX + (uint(texel.x) >> level.w)];
+}
+
+// Returns a texel that is in such a tile.
+uint texelOf(uvec4 level, uint tile, ivec2 texel) {
+    uint edge = 1u << level.w;
+    uint before = uint(texel.x) & ~(edge - 1u);
+    uint width = min(edge, level.x - before);
+    return imageWords[tile + (uint(texel.y) & (edge - 1u)) * width + uint(texel.x) - before];
+}
+
+// Returns what a level shows at a point, between four texels, times a weight; nothing where not all of them are here.
+vec4 bilinearLight(uvec4 level, ImagedTriangle t, vec2 at, float weight, out bool isHere) {
     ivec2 size = ivec2(level.xy);
     vec2 p = vec2(boundedPlace(at.x * float(size.x) - 0.5), boundedPlace(at.y * float(size.y) - 0.5));
     vec2 below = floor(p), f = p - below;
     ivec2 low = ivec2(wrappedTexel(int(below.x), size.x, t.wrapU), wrappedTexel(int(below.y), size.y, t.wrapV));
     ivec2 high =
         ivec2(wrappedTexel(int(below.x) + 1, size.x, t.wrapU), wrappedTexel(int(below.y) + 1, size.y, t.wrapV));
-    uint upper = level.z + uint(low.y * size.x), lower = level.z + uint(high.y * size.x);
-    return weightedTexel(upper + uint(low.x), weight * (1.0 - f.y) * (1.0 - f.x)) +
-           weightedTexel(upper + uint(high.x), weight * (1.0 - f.y) * f.x) +
-           weightedTexel(lower + uint(low.x), weight * f.y * (1.0 - f.x)) +
-           weightedTexel(lower + uint(high.x), weight * f.y * f.x);
+    uint first = tileOf(level, low);
+    uvec4 tiles = uvec4(first);
+    if (low >> int(level.w) != high >> int(level.w))
+        tiles = uvec4(first, tileOf(level, ivec2(high.x, low.y)), tileOf(level, ivec2(low.x, high.y)),
+                      tileOf(level, high));
+    isHere = all(notEqual(tiles, uvec4(0u)));
+    if (!isHere) return vec4(0.0);
+    return weightedTexel(texelOf(level, tiles.x, low), weight * (1.0 - f.y) * (1.0 - f.x)) +
+           weightedTexel(texelOf(level, tiles.y, ivec2(high.x, low.y)), weight * (1.0 - f.y) * f.x) +
+           weightedTexel(texelOf(level, tiles.z, ivec2(low.x, high.y)), weight * f.y * (1.0 - f.x)) +
+           weightedTexel(texelOf(level, tiles.w, high), weight * f.y * f.x);
+}
+
+// Returns what a level shows, or the next coarser one that is here; the coarsest is. `level`: word of its record.
+vec4 levelLight(uint level, ImagedTriangle t, vec2 at, float weight) {
+    bool isHere = false;
+    vec4 light = vec4(0.0);
+    DONT_UNROLL for (; !isHere; level += 4u) light = bilinearLight(imageRecord(level), t, at, weight, isHere);
+    return light;
 }
 
 // Returns the colour of a triangle at a point, encoded and with alpha, as filteredColour() times the material's factor.
 vec4 imageColour(ImagedTriangle t, vec2 at, TextureSlope slope, vec3 n, vec3 direction, float pixelEdge) {
     uvec4 image = imageRecord(t.image);
     ImageFootprint footprint = imageFootprint(slope, n, direction, pixelEdge, vec2(image.xy));
-    ImagePlaces places = imagePlaces(footprint, int(image.z), int(image.w));
-    uint finer = t.image + 4u + 4u * uint(places.finer);
-    uvec4 first = imageRecord(finer), second = imageRecord(places.coarser > 0.0 ? finer + 4u : finer);
+    ImagePlaces places = imagePlaces(footprint, int(image.z), int(image.w - image.z));
+    uint finer = t.image + 4u + 4u * (image.z + uint(places.finer));
     float part = 1.0 / float(places.count);
     vec4 sum = vec4(0.0);
     DONT_UNROLL for (int i = 0; i < places.count; i++) {
         vec2 place = at + ((float(i) + 0.5) * part - 0.5) * places.along;
-        sum += bilinearLight(first, t, place, (1.0 - places.coarser) * part);
-        if (places.coarser > 0.0) sum += bilinearLight(second, t, place, places.coarser * part);
+        sum += levelLight(finer, t, place, (1.0 - places.coarser) * part);
+        if (places.coarser > 0.0) sum += levelLight(finer + 4u, t, place, places.coarser * part);
     }
     // What is transparent lends no colour.
     if (!(sum.w > 0.0)) return vec4(0.0);

@@ -29,6 +29,17 @@ inline LevelledImage randomImage(uint32_t width, uint32_t height, uint32_t seed)
     return image;
 }
 
+/// Returns the texels of a level, row by row; 0 where they are not in memory.
+inline std::vector<uint32_t> texelsOf(const ImageSet::Level& level) {
+    std::vector<uint32_t> texels;
+    for (uint32_t y = 0; y < level.height; ++y)
+        for (uint32_t x = 0; x < level.width; ++x) {
+            const uint32_t* const tile = level.tileOf(x, y);
+            texels.push_back(tile != nullptr ? tile[level.placeInTile(x, y)] : 0);
+        }
+    return texels;
+}
+
 /// Tables of images, and the stored tiles.
 struct StoredImages {
     ImageTables tables;

@@ -13,6 +13,7 @@
 
 #include "octree/page/page.h"
 #include "octree/surface/leaf_triangles.h"
+#include "octree/surface/packing.h"
 #include "octree/surface/vertex_normal.h"
 
 namespace vcp::test {

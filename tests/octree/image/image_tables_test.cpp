@@ -115,25 +115,13 @@ TEST_F(ImageFile, IsReadBack) {
         ASSERT_EQ(image.levels.size(), images_[i].levels.size());
         for (size_t l = 0; l < image.levels.size(); ++l) {
             const auto& texels = images_[i].levels[l];
-            EXPECT_TRUE(std::equal(texels.begin(), texels.end(), image.levels[l].texels.get()));
+            EXPECT_EQ(test::texelsOf(image.levels[l]), texels);
         }
     }
     ASSERT_EQ(set->materials().size(), 3u);
     EXPECT_EQ(set->materials()[1].factor, 0xff102030u);
     EXPECT_EQ(set->materials()[1].wrapU, ImageWrap::Clamp);
     EXPECT_EQ(set->materials()[2].wrapV, ImageWrap::Mirror);
-}
-
-TEST_F(ImageFile, TheLargestLevelsGiveWayWhereMemoryIsShort) {
-    // 140 + 35 + 17 + 8 + 4 + 2 + 1 texels, 15 + 2 + 1, and 1.
-    const std::span<const ImageRow> images(stored_.tables.images);
-    const std::vector<uint32_t> all{0, 0, 0}, texels{2, 6, 0}, none{3, 7, 1};
-    EXPECT_EQ(finestWithin(images, all, texels, 226 * 4), all);
-    EXPECT_EQ(finestWithin(images, all, texels, 226 * 4 - 1), (std::vector<uint32_t>{0, 1, 0}));
-    EXPECT_EQ(finestWithin(images, all, texels, 0), texels);
-    EXPECT_EQ(finestWithin(images, all, none, 0), none);
-    EXPECT_EQ(finestWithin(images, {3, 0, 1}, texels, 207 * 4), (std::vector<uint32_t>{3, 0, 1})) << "two have none";
-    EXPECT_EQ(finestWithin(images, all, {2, 0, 0}, 0), (std::vector<uint32_t>{2, 0, 0})) << "one must stay";
 }
 
 TEST_F(ImageFile, EveryTruncationIsFound) {

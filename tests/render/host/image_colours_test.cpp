@@ -84,7 +84,7 @@ ImageSet storedSet(const LevelledImage& image) {
 TEST(ImageFilter, CoarserLevelsDoWhereMemoryIsScarce) {
     const LevelledImage image = test::randomImage(37, 21, 6);
     ImageSet set = storedSet(image);
-    set.drop(0, 1);
+    set.set(0, 0, {0, 0}, nullptr);
     ASSERT_EQ(set.images()[0].finest, 1u);
     for (int i = 0; i < 50; ++i) {
         const glm::dvec2 at(0.02 * i, 0.7 - 0.01 * i);

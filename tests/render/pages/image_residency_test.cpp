@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include "octree/image_needs.h"
 #include "tests/support/analytic_page.h"
 #include "tests/support/image_file.h"
 
@@ -38,6 +39,13 @@ protected:
         view.pixelsPerUnit = distance / (cells * dataset.cellOf(0));
         return view;
     }
+    /// What a page needs that shows all of an image.
+    [[nodiscard]] ImageNeed need(uint32_t image, float texelsPerCell) const {
+        const uint32_t across = blocksAcross(pieces_->tables().images[image]);
+        ImageNeed need{image, texelsPerCell, {}};
+        for (uint32_t block = 0; block < across * across; ++block) need.blocks.push_back(uint16_t(block));
+        return need;
+    }
     void look(ImageResidency& images, const SelectionView& view, ViewNumber number = 0) const {
         images.look(made_.dataset, view, {0}, number);
     }
@@ -61,6 +69,12 @@ protected:
         return finest;
     }
 
+    /// How many tiles of a level are shown.
+    [[nodiscard]] static int64_t tilesOf(const ImageResidency& images, uint32_t image, uint32_t level) {
+        const auto& tiles = images.shown()->images()[image].levels[level].tiles;
+        return int64_t(tiles.size()) - std::count(tiles.begin(), tiles.end(), nullptr);
+    }
+
     test::AnalyticDataset made_;
     std::shared_ptr<const ImagePieces> pieces_;
 };
@@ -77,7 +91,7 @@ TEST_F(ImageResidencyTest, NothingIsReadThatNoPageShows) {
 
 TEST_F(ImageResidencyTest, LevelsAreAsFineAsPixels) {
     ImageResidency images(pieces_, kAll);
-    images.learn(0, {{0, 8.0f}, {2, 1.0f}});
+    images.learn(0, {need(0, 8.0f), need(2, 1.0f)});
     // 8 texels a cell, half a pixel wide: from 16 cells a pixel on, 64 texels are one, which is level 6.
     look(images, pixelsOf(16.1));
     EXPECT_FALSE(images.wishes().empty());
@@ -97,7 +111,7 @@ TEST_F(ImageResidencyTest, LevelsAreAsFineAsPixels) {
 
 TEST_F(ImageResidencyTest, CoarseLevelsOfAllImagesComeFirst) {
     ImageResidency images(pieces_, kAll);
-    images.learn(0, {{0, 0.0f}, {1, 0.0f}, {2, 0.0f}});
+    images.learn(0, {need(0, 0.0f), need(1, 0.0f), need(2, 0.0f)});
     look(images, pixelsOf(1));
     EXPECT_EQ(settle(images, 3), 3u);
     static_cast<void>(images.wishes());
@@ -106,7 +120,7 @@ TEST_F(ImageResidencyTest, CoarseLevelsOfAllImagesComeFirst) {
 
 TEST_F(ImageResidencyTest, AreCopiedFourTimesAtMost) {
     ImageResidency images(pieces_, kAll);
-    images.learn(0, {{0, 0.0f}, {1, 0.0f}, {2, 0.0f}});
+    images.learn(0, {need(0, 0.0f), need(1, 0.0f), need(2, 0.0f)});
     look(images, pixelsOf(1));
     uint64_t copied = 0, version = 0;
     while (settle(images, 1) > 0) {
@@ -121,29 +135,32 @@ TEST_F(ImageResidencyTest, AreCopiedFourTimesAtMost) {
 TEST_F(ImageResidencyTest, MemoryGoesToWhatIsSeen) {
     const uint64_t most = 4 * 1024 * 1024 * 4 / 3 + 4 * 64 * 64;
     ImageResidency images(pieces_, most);
-    images.learn(0, {{0, 0.0f}});
+    images.learn(0, {need(0, 0.0f)});
     look(images, pixelsOf(1));
     settle(images);
     EXPECT_EQ(finest(images)[0], 0u);
     // What is not needed any more makes room, as far as that is lacking.
-    images.learn(0, {{0, 64.0f}, {1, 0.0f}});
+    images.learn(0, {need(0, 64.0f), need(1, 0.0f)});
     look(images, pixelsOf(1.01));
     settle(images);
     EXPECT_TRUE(images.isComplete());
     EXPECT_FALSE(images.isLimited());
-    EXPECT_EQ(finest(images), (std::vector<uint32_t>{1, 0, 9}));
+    EXPECT_EQ(finest(images), (std::vector<uint32_t>{0, 0, 9}));
+    EXPECT_EQ(tilesOf(images, 0, 0), 128) << "half of the level had to go";
     // Where all that is seen has no room, the largest levels are left out.
-    images.learn(0, {{0, 0.0f}, {1, 0.0f}, {2, 0.0f}});
+    images.learn(0, {need(0, 0.0f), need(1, 0.0f), need(2, 0.0f)});
     look(images, pixelsOf(1.02));
     settle(images);
     EXPECT_TRUE(images.isComplete());
     EXPECT_TRUE(images.isLimited());
-    EXPECT_EQ(finest(images), (std::vector<uint32_t>{1, 0, 0}));
+    EXPECT_EQ(finest(images), (std::vector<uint32_t>{0, 0, 0}));
+    EXPECT_EQ(tilesOf(images, 0, 0), 128) << "what is there and has room stays";
+    EXPECT_EQ(settle(images), 0u);
 }
 
 TEST_F(ImageResidencyTest, WhatIsNotInViewAnyMoreIsNotRead) {
     ImageResidency images(pieces_, kAll);
-    images.learn(0, {{0, 0.0f}});
+    images.learn(0, {need(0, 0.0f)});
     look(images, pixelsOf(1));
     EXPECT_FALSE(images.wishes().empty());
     settle(images, 2);
@@ -158,9 +175,34 @@ TEST_F(ImageResidencyTest, WhatIsNotInViewAnyMoreIsNotRead) {
     EXPECT_FALSE(images.wishes().empty());
 }
 
+TEST_F(ImageResidencyTest, OnlyThePartsThatAreSeenAreRead) {
+    // A piece is half of the image across; the other levels are read as a whole.
+    const auto corner = [&](uint16_t block) { return ImageNeed{0, 0.0f, {block}}; };
+    ImageResidency images(pieces_, 4 * (2 * 512 * 512 + 512 * 512 * 4 / 3));
+    const auto isThere = [&](uint32_t column, uint32_t row) {
+        return images.shown()->images()[0].levels[0].tileOf(column, row) != nullptr;
+    };
+    images.learn(0, {corner(0)});
+    look(images, pixelsOf(1));
+    settle(images);
+    EXPECT_TRUE(isThere(0, 0) && isThere(511, 511));
+    EXPECT_EQ(tilesOf(images, 0, 0), 64);
+    EXPECT_EQ(tilesOf(images, 0, 1), 64);
+    images.learn(0, {corner(15)});
+    look(images, pixelsOf(1.01));
+    EXPECT_EQ(settle(images), 1u);
+    EXPECT_TRUE(isThere(1023, 0) && isThere(0, 0)) << "there is room for two";
+    // What was seen before that goes, and nothing else.
+    images.learn(0, {corner(255)});
+    look(images, pixelsOf(1.02));
+    EXPECT_EQ(settle(images), 1u);
+    EXPECT_TRUE(isThere(1023, 1023) && isThere(1023, 0) && !isThere(0, 0));
+    EXPECT_FALSE(images.isLimited());
+}
+
 TEST_F(ImageResidencyTest, EveryViewHasWhatItNeeds) {
     ImageResidency images(pieces_, kAll);
-    images.learn(0, {{0, 8.0f}});
+    images.learn(0, {need(0, 8.0f)});
     look(images, pixelsOf(16.1), 3);
     look(images, pixelsOf(1.01), 7);
     settle(images);
@@ -173,14 +215,16 @@ TEST_F(ImageResidencyTest, EveryViewHasWhatItNeeds) {
 
 TEST_F(ImageResidencyTest, WhatCannotBeReadIsLeftOut) {
     ImageResidency images(pieces_, kAll);
-    images.learn(0, {{0, 0.0f}, {1, 0.0f}});
+    images.learn(0, {need(0, 0.0f), need(1, 0.0f)});
     look(images, pixelsOf(1));
     static_cast<void>(images.wishes());
     images.giveUp(pieces_->piecesOf(0, 1).first);
     images.giveUp(pieces_->piecesOf(1, 8).first);
     settle(images);
     EXPECT_TRUE(images.isComplete());
-    EXPECT_EQ(finest(images), (std::vector<uint32_t>{2, 10, 9})) << "the others have 10 and 9 levels";
+    EXPECT_EQ(finest(images), (std::vector<uint32_t>{0, 10, 9})) << "the others have 10 and 9 levels";
+    EXPECT_EQ(tilesOf(images, 0, 1), 0);
+    EXPECT_EQ(tilesOf(images, 0, 0), 256) << "a finer level does without";
 }
 
 }  // namespace

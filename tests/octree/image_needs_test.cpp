@@ -1,0 +1,142 @@
+// Which pieces of images a page needs: with these alone, every footprint on its triangles reads what it reads with all.
+#include "octree/image_needs.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "octree/dataset_reader.h"
+#include "octree/image/image_filter.h"
+#include "octree/imaged_triangle.h"
+#include "octree/page/page_triangles.h"
+#include "tests/support/image_file.h"
+#include "tests/support/soup_page.h"
+#include "tests/support/test_folder.h"
+
+namespace vcp {
+namespace {
+
+constexpr double kUnit = 1 << -kLog2TextureUnit;
+
+class ImageNeeds : public ::testing::Test {
+protected:
+    void SetUp() override {
+        test::StoredImages stored;
+        stored.add(test::randomImage(1900, 1300, 1), kMixedTiles);
+        stored.add(test::randomImage(700, 1100, 2), kLosslessTiles);
+        stored.tables.materials = {{0}, {1, ~0u, ImageWrap::Mirror, ImageWrap::Clamp}, {0, ~0u, ImageWrap::Clamp}};
+        test::writeImageFile(folder_ / "images.vcp", stored);
+        file_ = *openFile(folder_ / "images.vcp");
+        pieces_ = *ImagePieces::read(*file_, readDataset(*file_)->header.images);
+        for (uint64_t piece = 0; piece < pieces_->count(); ++piece) texels_.push_back(*pieces_->readPiece(*file_, piece));
+    }
+
+    /// Gives the vertices of a page places about (`middle`, `middle`), at most `reach` away, all in one material.
+    static std::vector<TexturePoint> points(const PageView& page, uint32_t material, double middle, double reach,
+                                            std::mt19937& random) {
+        std::vector<TexturePoint> points;
+        const auto any = [&] {
+            return int32_t(kUnit * (middle + reach * (2 * double(random()) / double(std::mt19937::max()) - 1)));
+        };
+        for (uint32_t i = 0; i < page.header.vertices; ++i) points.push_back({any(), any(), material});
+        return points;
+    }
+    [[nodiscard]] ImageSet setOf(const std::vector<bool>& has) const {
+        ImageAssembly assembly(pieces_);
+        for (uint64_t piece = 0; piece < has.size(); ++piece)
+            if (has[piece]) assembly.take(piece, texels_[piece]);
+        return assembly.set();
+    }
+
+    TestFolder folder_{"vcp_image_needs"};
+    std::shared_ptr<const ByteReader> file_;
+    std::shared_ptr<const ImagePieces> pieces_;
+    std::vector<std::vector<uint32_t>> texels_;  // of each piece
+};
+
+TEST_F(ImageNeeds, AreAllThatFootprintsRead) {
+    const test::WholePage whole = test::sheet(1, 2, 3, 5).build(1);
+    const ImageSet all = setOf(std::vector<bool>(pieces_->count(), true));
+    uint64_t left = 0;
+    for (uint32_t seed = 0; seed < 60; ++seed) {
+        SCOPED_TRACE(seed);
+        std::mt19937 random(seed);
+        const auto number = [&](double low, double high) {
+            return low + (high - low) * double(random()) / double(std::mt19937::max());
+        };
+        PageView page = whole.view();
+        const auto places = points(page, 1 + seed % 3, number(-2, 3), std::exp2(number(-7, 0.5)), random);
+        page.points = places;
+        const auto needs = imageNeeds(pieces_->tables(), page);
+        ASSERT_EQ(needs.size(), 1u);
+        const uint32_t image = needs[0].image, finest = seed % 5;
+        std::vector<bool> has(pieces_->count());
+        for (uint32_t level = finest; level < pieces_->levelsOf(image).size(); ++level)
+            for (const uint32_t piece : piecesNeeded(*pieces_, needs[0], level)) has[piece] = true;
+        left += uint64_t(std::count(has.begin(), has.end(), false));
+        const ImageSet some = setOf(has);
+        forEachTriangle(page, [&](const Index3& corners) {
+            const auto there = imagedTriangle(all, page, corners), here = imagedTriangle(some, page, corners);
+            ASSERT_TRUE(there && here);
+            for (int i = 0; i < 8; ++i) {
+                const auto b = float(number(0, 1)), c = float(number(0, 1 - double(b)));
+                // As wide as the finest level's texels, at least, wherever it is read.
+                f32::ImageFootprint footprint;
+                footprint.shortAxis = float(std::exp2(finest + number(0, 3)));
+                footprint.longAxis = footprint.shortAxis * float(std::exp2(number(0, 3)));
+                const double angle = number(0, 6.28);
+                footprint.along = footprint.longAxis * glm::vec2(std::cos(angle) / double(there->image->width),
+                                                                 std::sin(angle) / double(there->image->height));
+                const glm::vec4 wanted = filteredColour(*there->image, there->wraps, there->at(b, c),
+                                                        placesOf(*there->image, footprint));
+                ASSERT_EQ(filteredColour(*here->image, here->wraps, here->at(b, c), placesOf(*here->image, footprint)),
+                          wanted);
+            }
+        });
+    }
+    EXPECT_GT(left, 60 * pieces_->count() / 2) << "most pieces are of the other image, or elsewhere";
+}
+
+TEST_F(ImageNeeds, WhatIsNotThereIsSeenInACoarserLevel) {
+    std::vector<bool> has(pieces_->count(), true);
+    const auto [first, end] = pieces_->piecesOf(0, 0);
+    has[pieces_->pieceOf(0, 0, {1, 1})] = false;
+    const ImageSet some = setOf(has), all = setOf(std::vector<bool>(pieces_->count(), true));
+    ASSERT_EQ(some.images()[0].finest, 0u);
+    EXPECT_GT(end - first, 4u);
+    const ImageSet::Image &here = some.images()[0], &there = all.images()[0];
+    const auto at = [](double x, double y) { return glm::vec2(x / 1900, y / 1300); };
+    const auto places = placesOf(here, {{0, 0}, 1, 1});
+    ImagePlaces coarser = places;
+    coarser.finer = 1;
+    EXPECT_EQ(filteredColour(here, {}, at(300, 300), places), filteredColour(there, {}, at(300, 300), coarser));
+    EXPECT_EQ(filteredColour(here, {}, at(255.9, 300), places), filteredColour(there, {}, at(255.9, 300), coarser))
+        << "one of four texels is not there";
+    EXPECT_EQ(filteredColour(here, {}, at(1200, 300), places), filteredColour(there, {}, at(1200, 300), places));
+    // Without its coarsest level, nothing is shown of an image.
+    has[0] = false;
+    EXPECT_FALSE(setOf(has).images()[0].isShown());
+    EXPECT_TRUE(setOf(has).images()[1].isShown());
+}
+
+TEST_F(ImageNeeds, OfASmallPartAreSmall) {
+    const test::WholePage whole = test::sheet(1, 2, 3, 5).build(1);
+    std::mt19937 random(1);
+    PageView page = whole.view();
+    const auto places = points(page, 1, 0.3, 0.001, random);
+    page.points = places;
+    const auto needs = imageNeeds(pieces_->tables(), page);
+    ASSERT_EQ(needs.size(), 1u);
+    // 1900 texels are 16 blocks across, of which four may meet there.
+    EXPECT_EQ(blocksAcross(pieces_->tables().images[0]), 16u);
+    EXPECT_LE(needs[0].blocks.size(), 4u);
+    EXPECT_LE(piecesNeeded(*pieces_, needs[0], 0).size(), 2u);
+    // Twice around is all of it.
+    const auto around = points(page, 1, 0, 1.2, random);
+    page.points = around;
+    EXPECT_EQ(imageNeeds(pieces_->tables(), page)[0].blocks.size(), 256u);
+}
+
+}  // namespace
+}  // namespace vcp
