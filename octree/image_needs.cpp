@@ -91,16 +91,16 @@ struct Texels {
     int64_t first, last;
 };
 
-/// Returns the texels of a row of a level that are read about a block. Blocks hold what is read of level 0; of a coarser
-/// one, as many texels are, which are wider.
+/// Returns the texels of a row of a level that are read about a block. Blocks hold what is read of level 0; of a
+/// coarser one, as many texels are, which are wider.
 Texels texelsOf(uint32_t block, uint32_t across, uint32_t size, uint32_t level) {
     const int64_t reach = level == 0 ? 0 : kReach;
     const uint64_t end = (uint64_t{block} + 1) * size;
     return {int64_t(uint64_t{block} * size / across) - reach, int64_t((end + across - 1) / across) - 1 + reach};
 }
 
-/// Visits the tiles of a row of texels. Beyond an edge an image goes on from the other one; or with what is at this one,
-/// which is among them.
+/// Visits the tiles of a row of texels. Beyond an edge an image goes on from the other one; or with what is at this
+/// one, which is among them.
 template <class Visit>
 void forEachTile(Texels texels, int64_t size, uint32_t edge, const Visit& visit) {
     if (texels.last - texels.first >= size) texels = {0, size - 1};
@@ -161,8 +161,7 @@ std::vector<uint32_t> piecesNeeded(const ImagePieces& pieces, const ImageNeed& n
         });
     std::vector<uint32_t> needed;
     for (uint32_t i = 0; i < has.size(); ++i)
-        if (has[i])
-            needed.push_back(uint32_t(pieces.pieceOf(need.image, level, {i % of.tilesX(), i / of.tilesX()})));
+        if (has[i]) needed.push_back(uint32_t(pieces.pieceOf(need.image, level, {i % of.tilesX(), i / of.tilesX()})));
     std::sort(needed.begin(), needed.end());
     needed.erase(std::unique(needed.begin(), needed.end()), needed.end());
     return needed;

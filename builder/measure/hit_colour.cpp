@@ -6,6 +6,7 @@
 
 #include "builder/measure/mesh_bvh.h"
 #include "builder/stream/colour_encoding.h"
+#include "octree/imaged_triangle.h"
 #include "octree/page/strips.h"
 #include "octree/surface/leaf_math.h"
 
@@ -28,8 +29,18 @@ glm::dvec3 softColour(const PageView& view, uint32_t node, glm::dvec3 inLeaf) {
     return (1 - r.x) * blend(view.faceColours[face]) + r.x * blend(view.faceColours[face + 1]);
 }
 
+/// What the finest texels of a triangle's image show; nothing where it has none. `weights`: of its corners.
+std::optional<glm::dvec3> imagedColour(const PageView& view, const Index3& corners, glm::dvec3 weights,
+                                       const ImageSet* images) {
+    const auto triangle = images != nullptr ? imagedTriangle(*images, view, corners) : std::nullopt;
+    if (!triangle) return {};
+    const glm::vec2 at = triangle->at(float(weights.y), float(weights.z));
+    const ImagePlaces finest = placesOf(*triangle->image, {{0, 0}, 0, 0});
+    return glm::dvec3(triangle->factor * filteredColour(*triangle->image, triangle->wraps, at, finest));
+}
+
 /// The blend at the leaf's triangle that is nearest to the point, which is in cells from the page's lowest corner.
-glm::dvec3 hardColour(const PageView& view, uint32_t node, glm::dvec3 inPage) {
+glm::dvec3 hardColour(const PageView& view, uint32_t node, glm::dvec3 inPage, const ImageSet* images) {
     double nearest = std::numeric_limits<double>::infinity();
     glm::dvec3 colour(0);
     forEachTriangle(view.strips, node, [&](const Index3& v) {
@@ -41,6 +52,10 @@ glm::dvec3 hardColour(const PageView& view, uint32_t node, glm::dvec3 inPage) {
         if (distance >= nearest) return;
         nearest = distance;
         const glm::dvec3 weights = cornerWeights(point, corner[0], corner[1], corner[2]);
+        if (const auto shown = imagedColour(view, v, weights, images)) {
+            colour = *shown;
+            return;
+        }
         colour = glm::dvec3(0);
         for (int i = 0; i < 3; ++i) colour += weights[i] * storedColour(view.vertexColours[v[size_t(i)]]);
     });
@@ -58,7 +73,7 @@ glm::dvec3 cornerWeights(glm::dvec3 p, glm::dvec3 a, glm::dvec3 b, glm::dvec3 c)
     return {1 - second - third, second, third};
 }
 
-std::optional<glm::dvec3> lightOfHit(const PageCache& cache, const RayHit& hit) {
+std::optional<glm::dvec3> lightOfHit(const PageCache& cache, const RayHit& hit, const ImageSet* images) {
     const PageView& view = *cache.view(hit.page);
     if (view.faceColours.empty() && view.vertexColours.empty()) return {};
     const PageEntry& entry = cache.dataset().pages[hit.page];
@@ -66,7 +81,7 @@ std::optional<glm::dvec3> lightOfHit(const PageCache& cache, const RayHit& hit) 
     const uint32_t type = nodeType(hit.node);
     const glm::dvec3 stored = type == kNodeSoft   ? softColour(view, hit.node, (inPage - hit.leafMin) / hit.leafEdge)
                               : type == kNodeSlab ? storedColour(vectorWord(view.faceColours, slabVector(hit.node)))
-                                                  : hardColour(view, hit.node, inPage);
+                                                  : hardColour(view, hit.node, inPage, images);
     return glm::dvec3(srgbToLinear(stored.x), srgbToLinear(stored.y), srgbToLinear(stored.z));
 }
 

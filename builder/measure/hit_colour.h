@@ -3,6 +3,7 @@
 
 #include <optional>
 
+#include "octree/image/image_set.h"
 #include "octree/reference_caster.h"
 
 namespace vcp {
@@ -11,8 +12,9 @@ namespace vcp {
 /// where it has no area.
 glm::dvec3 cornerWeights(glm::dvec3 p, glm::dvec3 a, glm::dvec3 b, glm::dvec3 c);
 
-/// Returns the linear light, 0 to 1, that the renderer shows there without light; nothing where the dataset has no
-/// colour. Precondition: `hit` is of a ray through pages of `cache`.
-std::optional<glm::dvec3> lightOfHit(const PageCache& cache, const RayHit& hit);
+/// Returns the linear light, 0 to 1, that the renderer shows there without light, seen so near that a pixel is narrower
+/// than a texel; nothing where the dataset has no colour. `images`: all of the file's; null: colours are those of
+/// vertices and slabs. Precondition: `hit` is of a ray through pages of `cache`.
+std::optional<glm::dvec3> lightOfHit(const PageCache& cache, const RayHit& hit, const ImageSet* images = nullptr);
 
 }  // namespace vcp

@@ -196,9 +196,10 @@ void hitsOfLeaf(const ReferenceCaster& caster, const LeafBox& leaf, SampleRandom
 
 /// Returns how the colours of a hit and of the mesh's point nearest to it differ; nothing where one has none, or images
 /// cut the point out.
-std::optional<double> differenceAt(const PageCache& cache, const RayHit& hit, const MeshPaint& paint,
+std::optional<double> differenceAt(const PageCache& cache, const RayHit& hit, const SurfaceDistanceOptions& options,
                                    const IndexedMesh& mesh, const NearestPoint& nearest) {
-    const auto light = lightOfHit(cache, hit);
+    const MeshPaint& paint = *options.paint;
+    const auto light = lightOfHit(cache, hit, options.images);
     if (!light || !paint.hasColour()) return {};
     const auto corners = mesh.corners(nearest.triangle);
     const PaintedLight painted =
@@ -277,7 +278,7 @@ Result<SurfaceDistance> measureSurfaceDistance(const PageCache& cache, const Mes
                 const glm::dvec3 normal = triangleNormal(mesh.mesh(), nearest.triangle);
                 if (normal != glm::dvec3(0)) degrees[i / kBlock].push_back(float(lineDegrees(hit.normal, normal)));
                 if (options.paint == nullptr) continue;
-                if (const auto difference = differenceAt(cache, hit, *options.paint, mesh.mesh(), nearest))
+                if (const auto difference = differenceAt(cache, hit, options, mesh.mesh(), nearest))
                     colours[i / kBlock].push_back(float(*difference));
             }
         }))

@@ -20,6 +20,7 @@
 #include "builder/measure/mesh_bvh.h"
 #include "builder/measure/mesh_paint.h"
 #include "builder/measure/ray_classes.h"
+#include "octree/image/image_set.h"
 #include "octree/reference_caster.h"
 
 namespace vcp {
@@ -30,6 +31,7 @@ struct SurfaceDistanceOptions {
     unsigned threads = 0;         ///< 0: one a processor
     uint32_t level = UINT32_MAX;  ///< the level whose surface is measured; the finest if there is none of that number
     const MeshPaint* paint = nullptr;  ///< the mesh's colours; null: they are not measured
+    const ImageSet* images = nullptr;  ///< all images of the file; null: its colours are those of vertices and slabs
     /// Called from one thread at a time with the fraction done; false cancels. May be empty.
     std::function<bool(double)> progress;
 };

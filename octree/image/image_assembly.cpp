@@ -28,4 +28,14 @@ void ImageAssembly::drop(uint64_t number) {
     }
 }
 
+Result<ImageSet> readAllImages(const ByteReader& reader, const ImagesPlace& place) {
+    VCP_TRY_ASSIGN(const auto pieces, ImagePieces::read(reader, place));
+    ImageAssembly assembly(pieces);
+    for (uint64_t piece = 0; piece < pieces->count(); ++piece) {
+        VCP_TRY_ASSIGN(const auto texels, pieces->readPiece(reader, piece));
+        assembly.take(piece, texels);
+    }
+    return assembly.set();
+}
+
 }  // namespace vcp

@@ -32,4 +32,7 @@ private:
     std::vector<bool> has_;
 };
 
+/// Reads all pieces of a file whose place was checked. Errors: those of ImagePieces.
+Result<ImageSet> readAllImages(const ByteReader& reader, const ImagesPlace& place);
+
 }  // namespace vcp

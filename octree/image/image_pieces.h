@@ -69,8 +69,8 @@ private:
     std::vector<std::vector<ImageLevel>> levels_;
     std::vector<uint32_t> firstLevel_;
     std::vector<uint64_t> firstPiece_{0};  // of each image, and the end of the last
-    std::vector<Place> places_;      // of each tile in its level
-    std::vector<uint32_t> numbers_;  // of a level's tiles in the file's order, row by row
+    std::vector<Place> places_;            // of each tile in its level
+    std::vector<uint32_t> numbers_;        // of a level's tiles in the file's order, row by row
 };
 
 }  // namespace vcp

@@ -6,6 +6,7 @@
 namespace vcp {
 
 #define INLINE inline
+#define SELECT(condition, yes, no) ((condition) ? (yes) : (no))
 namespace f32 {
 #include "octree/shared/image_lookup.h"
 }  // namespace f32
@@ -14,5 +15,6 @@ namespace f64 {
 #include "octree/shared/image_lookup.h"
 }  // namespace f64
 #undef INLINE
+#undef SELECT
 
 }  // namespace vcp

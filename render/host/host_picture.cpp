@@ -150,12 +150,13 @@ private:
     }
 
     void keep(const TileHits& hits, const TileSurface& surface) {
-        HitColours colours(layer_.scene, hits);
+        uint32_t colours[kTilePixels] = {};
+        if (tiles_.isColoured()) tiles_.findOwnColours(hits, colours);
         forEachHit(hits, [&](glm::ivec2 pixel, int i) {
             const size_t to = at(pixel);
             planes_->depth[to] = tiles_.depthInCells(hits.depth[i]);
             planes_->normals[to] = surface.normal(i);
-            if (tiles_.isColoured()) planes_->albedo[to] = tiles_.colourOf(colours, hits, pixel, i);
+            if (tiles_.isColoured()) planes_->albedo[to] = colours[i];
             planes_->sun[to] = unormByte(surface.sun[i]);
             planes_->sky[to] = unormByte(surface.sky[i]);
             planes_->hits[to] = tiles_.hitOf(hits, i);

@@ -58,6 +58,9 @@ HWY_INLINE void store(Lane a, float* aligned) { hn::Store(a.v, Floats(), aligned
 HWY_INLINE LaneWords gather(const uint32_t* words, LaneWords index) {
     return hn::GatherIndex(Words(), words, hn::BitCast(Integers(), index));
 }
+HWY_INLINE Lane gatherFloats(const float* numbers, LaneWords index) {
+    return hn::GatherIndex(Floats(), numbers, hn::BitCast(Integers(), index));
+}
 /// Converts integers with a sign.
 HWY_INLINE Lane toFloats(LaneWords words) { return hn::ConvertTo(Floats(), hn::BitCast(Integers(), words)); }
 
@@ -81,6 +84,7 @@ HWY_INLINE Mask maskOf(uint32_t bits) {
 /// Vectors of two to four lanes, as glm has them of numbers.
 struct Lane2 {
     Lane x, y;
+    Lane2() = default;
     HWY_INLINE Lane2(Lane a, Lane b) : x(a), y(b) {}
 };
 struct Lane3 {
@@ -93,6 +97,10 @@ struct Lane4 {
     Lane4() = default;
     HWY_INLINE Lane4(Lane a, Lane b, Lane c, Lane d) : x(a), y(b), z(c), w(d) {}
 };
+HWY_INLINE Lane2 operator+(Lane2 a, Lane2 b) { return {a.x + b.x, a.y + b.y}; }
+HWY_INLINE Lane2 operator*(Lane2 a, Lane2 b) { return {a.x * b.x, a.y * b.y}; }
+HWY_INLINE Lane2 operator*(Lane a, Lane2 b) { return {a * b.x, a * b.y}; }
+HWY_INLINE Lane2 operator/(Lane2 a, Lane2 b) { return {a.x / b.x, a.y / b.y}; }
 HWY_INLINE Lane2 operator-(Lane2 a, Lane2 b) { return {a.x - b.x, a.y - b.y}; }
 HWY_INLINE Lane3 operator+(Lane3 a, Lane3 b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
 HWY_INLINE Lane3 operator-(Lane3 a, Lane3 b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
@@ -108,6 +116,9 @@ HWY_INLINE Lane3 mulAdd(Lane a, Lane3 b, Lane3 c) {
 }
 HWY_INLINE Lane3 cross(Lane3 a, Lane3 b) {
     return {mulSub(a.y, b.z, a.z * b.y), mulSub(a.z, b.x, a.x * b.z), mulSub(a.x, b.y, a.y * b.x)};
+}
+HWY_INLINE Lane2 select(Mask mask, Lane2 yes, Lane2 no) {
+    return {select(mask, yes.x, no.x), select(mask, yes.y, no.y)};
 }
 HWY_INLINE Lane3 select(Mask mask, Lane3 yes, Lane3 no) {
     return {select(mask, yes.x, no.x), select(mask, yes.y, no.y), select(mask, yes.z, no.z)};

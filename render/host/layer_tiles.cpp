@@ -14,6 +14,7 @@
 #include "render/host/hit_surface.h"
 #include "render/host/section_caps.h"
 #include "render/host/slab_blend.h"
+#include "render/host/tile_colours.h"
 
 namespace vcp {
 
@@ -121,21 +122,21 @@ void LayerTiles::markPages(const TileHits& hits) const {
 void LayerTiles::findAlbedo(const TileHits& hits, TileSurface& surface) const {
     setClay(surface);
     if (!isColoured_ && hits.onCap.none()) return;
-    HitColours colours(layer_.scene, hits);
-    forEachPixel(size_, hits.corner, [&](glm::ivec2 pixel, int i) {
+    uint32_t colours[kTilePixels];
+    if (isColoured_) findOwnColours(hits, colours);
+    forEachPixel(size_, hits.corner, [&](glm::ivec2, int i) {
         if (!std::isfinite(hits.depth[i])) return;
         // Colours have 8 bits between the passes of a device, too.
         if (hits.onCap[size_t(i)])
             setAlbedo(surface, i, layer_.frame.cap);
         else if (isColoured_)
-            setAlbedo(surface, i, glm::unpackUnorm4x8(colourOf(colours, hits, pixel, i)));
+            setAlbedo(surface, i, glm::unpackUnorm4x8(colours[i]));
     });
 }
 
-uint32_t LayerTiles::colourOf(HitColours& colours, const TileHits& hits, glm::ivec2 pixel, int i) const {
-    return packedColour(colours.at(i, [&] {
-        return HitColours::PixelView{glm::vec3(rayOf(pixel).direction), pixelEdgeAt(depthInCells(hits.depth[i]))};
-    }));
+void LayerTiles::findOwnColours(const TileHits& hits, uint32_t (&colours)[kTilePixels]) const {
+    const auto perDepth = float(double(layer_.frame.pixelEdgePerDepth) / layer_.scene.grid().cell);
+    findColours(layer_.scene, layer_.rays, {layer_.frame.pixelEdge, perDepth}, hits, colours);
 }
 
 void LayerTiles::setClay(TileSurface& surface) const {

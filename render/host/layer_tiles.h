@@ -9,7 +9,6 @@
 
 #include <glm/gtc/quaternion.hpp>
 
-#include "render/host/hit_colours.h"
 #include "render/host/host_picture.h"
 #include "render/host/light_rays.h"
 #include "render/host/section_cut.h"
@@ -60,8 +59,8 @@ public:
     void cast(TileHits& hits) const;
     /// Finds the colours of a tile's hits without light.
     void findAlbedo(const TileHits& hits, TileSurface& surface) const;
-    /// Returns the colour of a hit, RGBA8. `colours`: of the tile's hits.
-    [[nodiscard]] uint32_t colourOf(HitColours& colours, const TileHits& hits, glm::ivec2 pixel, int i) const;
+    /// Finds the same of those that are not on caps, RGBA8; the other elements stay what they are.
+    void findOwnColours(const TileHits& hits, uint32_t (&colours)[kTilePixels]) const;
     void setClay(TileSurface& surface) const;
     /// Returns the line of the wireframe at a hit.
     [[nodiscard]] HitLine lineOf(const TileHits& hits, glm::ivec2 pixel, int i) const;

@@ -67,8 +67,7 @@ void ImageResidency::look(const Dataset& dataset, const SelectionView& view, con
         if (shown == pages_.end() || !inFrustum(dataset, dataset.pages[page], view)) continue;
         const double edge = pixelEdgeAt(dataset, dataset.pages[page], view);
         for (const Shown& of : shown->second) {
-            const uint32_t finest =
-                finestNeeded(of.texelsPerCell, edge, uint32_t(pieces().levelsOf(of.image).size()));
+            const uint32_t finest = finestNeeded(of.texelsPerCell, edge, uint32_t(pieces().levelsOf(of.image).size()));
             const uint32_t begin = of.begin[std::min(size_t{finest}, of.begin.size() - 1)];
             for (size_t i = begin; i < of.pieces.size(); ++i) look.needed[of.pieces[i]] = true;
         }
@@ -154,9 +153,8 @@ void ImageResidency::makeRoom() {
         if (!planned_[piece] && assembly_.has(piece)) others.push_back(piece);
     }
     // Pieces of one plan go with their highest numbers first, since finer levels have these.
-    std::sort(others.begin(), others.end(), [&](uint64_t a, uint64_t b) {
-        return needed_[a] != needed_[b] ? needed_[a] < needed_[b] : a > b;
-    });
+    std::sort(others.begin(), others.end(),
+              [&](uint64_t a, uint64_t b) { return needed_[a] != needed_[b] ? needed_[a] < needed_[b] : a > b; });
     for (auto piece = others.begin(); piece != others.end() && bytes > mostBytes_; ++piece) {
         assembly_.drop(*piece);
         bytes -= bytes_[*piece];

@@ -39,8 +39,8 @@ public:
     void forgetView(ViewNumber number);
     /// Takes in the texels of a piece that was wished for.
     void take(uint64_t piece, std::span<const uint32_t> texels);
-    /// A piece cannot be read: it is not wished for any more. What it would show is seen in a coarser level; without the
-    /// first piece of an image, nothing of it is.
+    /// A piece cannot be read: it is not wished for any more. What it would show is seen in a coarser level; without
+    /// the first piece of an image, nothing of it is.
     void giveUp(uint64_t piece);
     /// Chooses what is to be in memory, and returns the pieces to read, by their number.
     std::vector<Wish> wishes();

@@ -34,9 +34,8 @@ std::vector<uint32_t> tableWords(const ImageSet& set, std::vector<std::span<cons
     const Layout layout(set);
     std::vector<uint32_t> words{uint32_t(set.materials().size()), 0, 0, 0};
     for (const MaterialRow& material : set.materials())
-        words.insert(words.end(),
-                     {set.images()[material.image].isShown() ? layout.images[material.image] : 0, material.factor,
-                      uint32_t(material.wrapU) | uint32_t(material.wrapV) << 8, 0});
+        words.insert(words.end(), {set.images()[material.image].isShown() ? layout.images[material.image] : 0,
+                                   material.factor, uint32_t(material.wrapU) | uint32_t(material.wrapV) << 8, 0});
     size_t number = 0;
     for (const ImageSet::Image& image : set.images()) {
         words.insert(words.end(), {image.width, image.height, image.finest, uint32_t(image.levels.size())});

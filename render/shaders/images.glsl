@@ -9,7 +9,9 @@
 //                      edge of its tiles
 //   1 word a tile      where its texels begin, 0 where it is not here; row by row
 //   1 word a texel     RGBA8, row by row of a tile
+#define SELECT(condition, yes, no) ((condition) ? (yes) : (no))
 #include "octree/shared/image_lookup.h"
+#undef SELECT
 
 uvec4 imageRecord(uint word) {
     return uvec4(imageWords[word], imageWords[word + 1u], imageWords[word + 2u], imageWords[word + 3u]);
@@ -119,14 +121,14 @@ vec4 levelLight(uint level, ImagedTriangle t, vec2 at, float weight) {
 vec4 imageColour(ImagedTriangle t, vec2 at, TextureSlope slope, vec3 n, vec3 direction, float pixelEdge) {
     uvec4 image = imageRecord(t.image);
     ImageFootprint footprint = imageFootprint(slope, n, direction, pixelEdge, vec2(image.xy));
-    ImagePlaces places = imagePlaces(footprint, int(image.z), int(image.w - image.z));
-    uint finer = t.image + 4u + 4u * (image.z + uint(places.finer));
-    float part = 1.0 / float(places.count);
+    ImagePlaces places = imagePlaces(footprint, float(image.z), float(image.w - 1u));
+    uint finer = t.image + 4u + 4u * uint(places.level);
+    float part = 1.0 / places.count, coarser = fract(places.level);
     vec4 sum = vec4(0.0);
-    DONT_UNROLL for (int i = 0; i < places.count; i++) {
+    DONT_UNROLL for (int i = 0; i < int(places.count); i++) {
         vec2 place = at + ((float(i) + 0.5) * part - 0.5) * places.along;
-        sum += levelLight(finer, t, place, (1.0 - places.coarser) * part);
-        if (places.coarser > 0.0) sum += levelLight(finer + 4u, t, place, places.coarser * part);
+        sum += levelLight(finer, t, place, (1.0 - coarser) * part);
+        if (coarser > 0.0) sum += levelLight(finer + 4u, t, place, coarser * part);
     }
     // What is transparent lends no colour.
     if (!(sum.w > 0.0)) return vec4(0.0);

@@ -68,15 +68,14 @@ TEST_F(ImageBuild, KeepsImagesAndWhereTheyLie) {
     EXPECT_EQ(h.images.images, 2u);
     EXPECT_EQ(h.images.materials, 2u);
     // Each image's levels are those that colours were filtered from.
-    const auto set = test::wholeImages(**file, h.images);
+    const auto set = readAllImages(**file, h.images);
     ASSERT_TRUE(set.ok());
     const char* names[] = {"floor.png", "wall.png"};
     for (size_t i = 0; i < 2; ++i) {
         const Texture texture(*loadImage({folder_ / names[i], nullptr}));
         ASSERT_EQ(set->images()[i].levels.size(), texture.levels().size());
         for (size_t l = 0; l < texture.levels().size(); ++l)
-            EXPECT_TRUE(std::equal(texture.levels()[l].texels.begin(), texture.levels()[l].texels.end(),
-                                   set->images()[i].levels[l].texels.get()));
+            EXPECT_EQ(texture.levels()[l].texels, test::texelsOf(set->images()[i].levels[l]));
     }
     // Each vertex of the finest triangles is where its place in the world says, to a quarter of 1/32 texel and the
     // lattice's rounding; and all triangles of a wall have its material.
@@ -195,15 +194,15 @@ TEST_F(ImageBuild, CodesImagesAsGoodAsIsAskedFor) {
         ASSERT_TRUE(verifyFile(**file).ok()) << verifyFile(**file).error().line();
         const auto header = readDataset(**file)->header;
         bytes[quality.coarser.value_or(-1)] = header.images.bytes;
-        const auto set = test::wholeImages(**file, header.images);
+        const auto set = readAllImages(**file, header.images);
         ASSERT_TRUE(set.ok());
         for (size_t l = 0; l < texture.levels().size(); ++l) {
             const Image& level = texture.levels()[l];
+            const std::vector<uint32_t> stored = test::texelsOf(set->images()[0].levels[l]);
             double squares = 0;
             for (size_t i = 0; i < level.texels.size(); ++i)
                 for (int c = 0; c < 3; ++c) {
-                    const int apart = int(level.texels[i] >> 8 * c & 255u) -
-                                      int(set->images()[0].levels[l].texels.get()[i] >> 8 * c & 255u);
+                    const int apart = int(level.texels[i] >> 8 * c & 255u) - int(stored[i] >> 8 * c & 255u);
                     squares += apart * apart;
                 }
             const double error = std::sqrt(squares / (3 * double(level.texels.size())));

@@ -29,7 +29,8 @@ protected:
         test::writeImageFile(folder_ / "images.vcp", stored);
         file_ = *openFile(folder_ / "images.vcp");
         pieces_ = *ImagePieces::read(*file_, readDataset(*file_)->header.images);
-        for (uint64_t piece = 0; piece < pieces_->count(); ++piece) texels_.push_back(*pieces_->readPiece(*file_, piece));
+        for (uint64_t piece = 0; piece < pieces_->count(); ++piece)
+            texels_.push_back(*pieces_->readPiece(*file_, piece));
     }
 
     /// Gives the vertices of a page places about (`middle`, `middle`), at most `reach` away, all in one material.
@@ -88,8 +89,8 @@ TEST_F(ImageNeeds, AreAllThatFootprintsRead) {
                 const double angle = number(0, 6.28);
                 footprint.along = footprint.longAxis * glm::vec2(std::cos(angle) / double(there->image->width),
                                                                  std::sin(angle) / double(there->image->height));
-                const glm::vec4 wanted = filteredColour(*there->image, there->wraps, there->at(b, c),
-                                                        placesOf(*there->image, footprint));
+                const glm::vec4 wanted =
+                    filteredColour(*there->image, there->wraps, there->at(b, c), placesOf(*there->image, footprint));
                 ASSERT_EQ(filteredColour(*here->image, here->wraps, here->at(b, c), placesOf(*here->image, footprint)),
                           wanted);
             }
@@ -109,7 +110,7 @@ TEST_F(ImageNeeds, WhatIsNotThereIsSeenInACoarserLevel) {
     const auto at = [](double x, double y) { return glm::vec2(x / 1900, y / 1300); };
     const auto places = placesOf(here, {{0, 0}, 1, 1});
     ImagePlaces coarser = places;
-    coarser.finer = 1;
+    coarser.level = 1;
     EXPECT_EQ(filteredColour(here, {}, at(300, 300), places), filteredColour(there, {}, at(300, 300), coarser));
     EXPECT_EQ(filteredColour(here, {}, at(255.9, 300), places), filteredColour(there, {}, at(255.9, 300), coarser))
         << "one of four texels is not there";

@@ -109,7 +109,7 @@ TEST_P(ImageTest, AreNotOfOtherColours) {
 TEST_P(ImageTest, CoarserOnesDoWhereTheBudgetIsSmall) {
     RendererOptions options;
     options.access = GetParam();
-    options.budgetBytes = (uint64_t{1} << 20) + 20000;
+    options.budgetBytes = (uint64_t{1} << 20) + 30000;
     start(options);
     const auto host = HostRenderer::create({});
     ASSERT_TRUE(host);
@@ -117,7 +117,7 @@ TEST_P(ImageTest, CoarserOnesDoWhereTheBudgetIsSmall) {
     ASSERT_TRUE((*host)->open({walls_}, {}));
     EXPECT_LT(apart(*renderer_, **host, unlit(cameras()[1])).second, 0.8) << "from afar";
     const double near = apart(*renderer_, **host, unlit(cameras()[2])).second;
-    EXPECT_GT(near, 3) << "20,000 bytes do not hold the finest levels";
+    EXPECT_GT(near, 3) << "30,000 bytes do not hold the finest level of the floor";
     EXPECT_LT(near, 50);
 }
 

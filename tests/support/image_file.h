@@ -63,17 +63,6 @@ struct StoredImages {
     }
 };
 
-/// Reads the images of a file, piece by piece, with all their levels. Errors: ImagePieces'.
-inline Result<ImageSet> wholeImages(const ByteReader& reader, const ImagesPlace& place) {
-    VCP_TRY_ASSIGN(const auto pieces, ImagePieces::read(reader, place));
-    ImageAssembly assembly(pieces);
-    for (uint64_t piece = 0; piece < pieces->count(); ++piece) {
-        VCP_TRY_ASSIGN(const auto texels, pieces->readPiece(reader, piece));
-        assembly.take(piece, texels);
-    }
-    return assembly.set();
-}
-
 /// Writes a file of one empty page with images.
 inline void writeImageFile(const std::filesystem::path& path, const StoredImages& images) {
     PageHeader page;

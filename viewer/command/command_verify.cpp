@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "builder/measure/surface_distance.h"
+#include "octree/image/image_assembly.h"
 #include "octree/vcp_verify.h"
 #include "streaming/http_reader.h"
 #include "streaming/read_ahead.h"
@@ -48,6 +49,12 @@ Result<Dataset> checkBytes(const ByteReader& reader, ProgressStyle style) {
     return dataset;
 }
 
+Result<ImageSet> imagesOf(const std::filesystem::path& path, const Dataset& dataset) {
+    if (!dataset.hasImages()) return ImageSet();
+    VCP_TRY_ASSIGN(const auto file, openFile(path));
+    return readAllImages(*file, dataset.header.images);
+}
+
 Result<SurfaceDistance> measure(const VerifyCommand& command) {
     ProgressDisplay display(command.report.progressStyle(), stderr);
     display.update("reading the mesh", 0);
@@ -67,6 +74,7 @@ Result<SurfaceDistance> measure(const VerifyCommand& command) {
                      .file = command.file};
     VCP_TRY(cache.loadLevel(std::min(command.level, levels - 1)));
     if (cache.dataset().hasColour()) paint.loadImages();
+    VCP_TRY_ASSIGN(const auto images, imagesOf(command.file, cache.dataset()));
     for (const std::string& warning : paint.warnings()) warnOnTerminal(warning);
 
     SurfaceDistanceOptions options;
@@ -74,6 +82,7 @@ Result<SurfaceDistance> measure(const VerifyCommand& command) {
     options.level = command.level;
     options.threads = command.threads;
     options.paint = &paint;
+    options.images = &images;
     options.progress = [&](double fraction) {
         display.update("measuring", 0.3 + 0.7 * fraction);
         return !interrupted();

@@ -10,7 +10,9 @@
 #include "builder/measure/colour_difference.h"
 #include "builder/measure/surface_distance.h"
 #include "builder/stream/colour_encoding.h"
+#include "octree/image/image_assembly.h"
 #include "tests/support/test_folder.h"
+#include "tests/support/textured_walls.h"
 
 namespace vcp {
 namespace {
@@ -64,7 +66,7 @@ protected:
 
     /// Measures a level against a mesh's file.
     static SurfaceDistance measured(const PageCache& cache, const std::filesystem::path& path, uint32_t level,
-                                    unsigned threads = 2) {
+                                    unsigned threads = 2, const ImageSet* images = nullptr) {
         MeshPaint paint;
         LoadOptions load;
         load.chunk = [&](size_t file, const MeshStream& stream, const MeshChunk& chunk) {
@@ -72,12 +74,14 @@ protected:
         };
         const auto mesh = loadMesh(path, load);
         EXPECT_TRUE(mesh.ok());
+        paint.loadImages();
         const MeshBvh bvh(*mesh);
         SurfaceDistanceOptions options;
         options.samples = 4000;
         options.threads = threads;
         options.level = level;
         options.paint = &paint;
+        options.images = images;
         const auto result = measureSurfaceDistance(cache, bvh, options);
         EXPECT_TRUE(result.ok()) << result.error().line();
         return *result;
@@ -115,6 +119,22 @@ TEST_F(ColoursOfAFile, AShiftIsMeasured) {
     EXPECT_GT(d.colourDifference.p50, least);
     EXPECT_LT(d.colourDifference.max, most + 0.5);
     EXPECT_GT(d.colourDifference.max, (least + most) / 2);
+}
+
+TEST_F(ColoursOfAFile, ImagesAreMeasuredAtTheirFinestTexels) {
+    const auto noise = [](uint32_t x, uint32_t y) { return (x * 37 + y * 91) % 256 | ((x * 7) ^ (y * 5)) % 256 << 8; };
+    test::TexturedWalls::write(folder_.path(), noise, noise);
+    const auto mesh = folder_ / "walls.obj";
+    const PageCache cache = build(mesh);
+    ASSERT_TRUE(cache.dataset().hasImages());
+    const auto file = openFile(folder_ / "out.vcp");
+    const auto images = readAllImages(**file, cache.dataset().header.images);
+    ASSERT_TRUE(images.ok());
+    const SurfaceDistance seen = measured(cache, mesh, UINT32_MAX, 2, &*images);
+    EXPECT_GT(seen.colourSamples, 1000u);
+    EXPECT_LT(seen.colourDifference.p95, 0.5) << "coordinates are kept to 1/32 texel";
+    EXPECT_LT(seen.colourDifference.p99, 3) << "walls meet at edges";
+    EXPECT_GT(measured(cache, mesh, UINT32_MAX).colourDifference.p50, 5) << "of the vertices' colours";
 }
 
 TEST_F(ColoursOfAFile, SameForAnyThreads) {

@@ -107,7 +107,7 @@ TEST_F(ImageFile, IsReadBack) {
     ASSERT_TRUE(dataset.ok());
     EXPECT_EQ(dataset->header.version, kImagesFileVersion);
     EXPECT_TRUE(dataset->hasImages());
-    const auto set = test::wholeImages(file, dataset->header.images);
+    const auto set = readAllImages(file, dataset->header.images);
     ASSERT_TRUE(set.ok()) << set.error().line();
     ASSERT_EQ(set->images().size(), images_.size());
     for (size_t i = 0; i < images_.size(); ++i) {
@@ -150,7 +150,7 @@ TEST_F(ImageFile, AWrongTileIsNamed) {
     ASSERT_FALSE(verified.ok());
     EXPECT_NE(verified.error().line().find("tile 0: byte " + std::to_string(first)), std::string::npos)
         << verified.error().line();
-    EXPECT_FALSE(test::wholeImages(file, place()).ok());
+    EXPECT_FALSE(readAllImages(file, place()).ok());
 }
 
 TEST_F(ImageFile, LiesBehindTheRightHashAreRefused) {

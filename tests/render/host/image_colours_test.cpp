@@ -78,7 +78,7 @@ ImageSet storedSet(const LevelledImage& image) {
     stored.tables.materials = {{}};
     test::writeImageFile(folder / "image.vcp", stored);
     const auto file = openFile(folder / "image.vcp");
-    return *test::wholeImages(**file, readDataset(**file)->header.images);
+    return *readAllImages(**file, readDataset(**file)->header.images);
 }
 
 TEST(ImageFilter, CoarserLevelsDoWhereMemoryIsScarce) {
