@@ -380,8 +380,11 @@ private:
         if (!mayKeepImages()) return placed;
         openImages(1);
         const double begins = kReadingShare + kDealingShare / 2;
-        VCP_TRY_ASSIGN(placed, storeImages(files_.soup->materials, options_, memory_.vertexBytes, files_.images.front(),
-                                           report_.warnings, [&](double) { return progress("sorting", begins); }));
+        const auto report = [&](double part) { return progress("images", begins + kDealingShare / 4 * part); };
+        // Nothing else takes the memory of pages yet.
+        VCP_TRY_ASSIGN(placed, storeImages(files_.soup->materials, options_, memory_.pageBytes, space_,
+                                           files_.images.front(), report_.warnings, report));
+        releaseMemory();
         if (!placed.empty()) openTextures();
         return placed;
     }
@@ -400,14 +403,14 @@ private:
         VCP_TRY_ASSIGN(const auto placed, arena_.execute([&] { return keepImages(); }));
         const LatticeSnapper snapper(plan_.frame, colours ? &*colours : nullptr, colourUse().vertices, plan_.pages,
                                      placed);
-        const double begins = kReadingShare + kDealingShare / 2;
+        const double ends = kReadingShare + kDealingShare, begins = ends - kDealingShare / (placed.empty() ? 2 : 4);
         const Dealing dealing{*files_.soup,
                               snapper,
                               plan_.gridOf(pass_ - 1),
                               files_.textures.get(),
                               plan_.pages,
                               plan_.marginCells(),
-                              [&](double part) { return progress("sorting", begins + kDealingShare / 2 * part); }};
+                              [&](double part) { return progress("sorting", begins + (ends - begins) * part); }};
         openPass();
         VCP_TRY(arena_.execute([&] { return dealTriangles(dealing, plan_.finest, *files_.current); }));
         if (colours)
