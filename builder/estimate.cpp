@@ -102,8 +102,8 @@ private:
 
 }  // namespace
 
-uint64_t expectedTempBytes(uint64_t triangles, uint64_t heldInMemory) {
-    const auto bytes = uint64_t(kTempBytesPerTriangle * double(triangles));
+uint64_t expectedTempBytes(uint64_t triangles, uint64_t imageBytes, uint64_t heldInMemory) {
+    const uint64_t bytes = uint64_t(kTempBytesPerTriangle * double(triangles)) + imageBytes;
     return bytes > heldInMemory ? bytes : 0;
 }
 
@@ -209,10 +209,10 @@ Result<BuildEstimate> estimateBuild(const BuildOptions& options) {
     if (use.materials) bytesPerTriangle += kImageBytesPerTriangle;
     if (imageBytes > 0) bytesPerTriangle += kPlaceBytesPerTriangle;
     estimate.fileBytes = uint64_t(bytesPerTriangle * double(m.triangles)) + imageBytes;
-    estimate.seconds = reading + figures.seconds * double(m.triangles);
+    estimate.seconds = reading + figures.seconds * double(m.triangles) + expectedImageSeconds(imageBytes);
     // A checkpoint writes all that is held in memory.
     const bool mayCheckpoint = kSlower * estimate.seconds > options.checkpointSeconds;
-    estimate.tempBytes = expectedTempBytes(m.triangles, mayCheckpoint ? 0 : plan.tempBytes);
+    estimate.tempBytes = expectedTempBytes(m.triangles, imageBytes, mayCheckpoint ? 0 : plan.tempBytes);
     estimate.freeTempBytes = freeBytesAt(tempFolderOf(options));
     estimate.freeOutputBytes = freeBytesAt(options.output);
     return estimate;

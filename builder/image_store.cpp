@@ -30,6 +30,8 @@ constexpr uint32_t kTilesAtOnce = 32;
 constexpr uint64_t kCodedBytes = uint64_t{16} << 20;
 // What images take in a file, of what their own files take: JPEGs with their coarser levels, and PNGs.
 constexpr double kStoredOfJpeg = 1.5, kStoredOfPng = 0.9;
+// Time to read and code what becomes a byte of the file, on two cores.
+constexpr double kSecondsOfByte = 0.3e-6;
 
 /// Names an image by where it comes from: it is decoded once for all materials that have it.
 using ImageKey = std::pair<std::filesystem::path, const std::string*>;
@@ -220,6 +222,8 @@ uint64_t expectedImageBytes(std::span<const Material> materials) {
     return uint64_t(std::accumulate(bytes.begin(), bytes.end(), 0.0,
                                     [](double sum, const auto& image) { return sum + image.second; }));
 }
+
+double expectedImageSeconds(uint64_t bytes) { return kSecondsOfByte * double(bytes); }
 
 Result<ImageTables> storedTables(const PageSpool& spool) {
     ImageTables tables;

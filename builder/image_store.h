@@ -30,6 +30,8 @@ Result<std::vector<PlacedMaterial>> storeImages(std::span<const Material> materi
 
 /// Returns about how many bytes images of such materials take in a file, by the sizes of theirs; without reading them.
 uint64_t expectedImageBytes(std::span<const Material> materials);
+/// Returns about how long it takes to code images of so many expected bytes.
+double expectedImageSeconds(uint64_t bytes);
 
 /// Returns the tables of the images in a spool, without the tiles' offsets; empty where there are none. The tiles are
 /// its first entries. Errors: Io, InvalidInput (damaged).
