@@ -327,7 +327,8 @@ Result<void> ScanMesh::writeObj(const Write& write, const std::string& materials
     for (size_t i = 0; i < parts_.size(); ++i) {
         const Chart chart(i, parts_.size());
         const auto putPlace = [&](const Corner& corner) {
-            // A picture's rows come from the top, and coordinates count from below; seen from outside, u runs to the left.
+            // A picture's rows come from the top, and coordinates count from below; seen from outside, u runs to the
+            // left.
             return put(std::snprintf(line, sizeof line, "vt %.8f %.8f\n", chart.left + chart.edge * (1 - corner.u),
                                      1 - (chart.top + chart.edge * corner.v)));
         };
