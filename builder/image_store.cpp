@@ -7,12 +7,14 @@
 #include <map>
 #include <numeric>
 #include <optional>
+#include <set>
 
 #include <fmt/format.h>
 #include <oneapi/tbb/parallel_for.h>
 
 #include "builder/texture/jpeg_blocks.h"
 #include "builder/texture/level_bands.h"
+#include "builder/texture/texture.h"
 #include "octree/image/jpeg_tile.h"
 #include "octree/image/tile_codec.h"
 
@@ -141,10 +143,12 @@ private:
     std::vector<uint32_t> places_;  ///< of each tile, row by row of each level: its number in the work
 };
 
+uint64_t memoryFor(const ImageRows& image) { return levelBandBytes(image.size()) + image.heldBytes() + kCodedBytes; }
+
 /// Returns the error that an image takes more memory than there is for one; nothing where it does not.
 std::optional<Error> tooLargeFor(uint64_t imageBytes, const ImageSource& source, const ImageRows& image) {
     const glm::uvec2 size = image.size();
-    const uint64_t needed = levelBandBytes(size) + image.heldBytes() + kCodedBytes;
+    const uint64_t needed = memoryFor(image);
     if (needed <= imageBytes) return {};
     return namedImageError(
         source, {.code = ErrorCode::Limit,
@@ -221,6 +225,19 @@ uint64_t expectedImageBytes(std::span<const Material> materials) {
     }
     return uint64_t(std::accumulate(bytes.begin(), bytes.end(), 0.0,
                                     [](double sum, const auto& image) { return sum + image.second; }));
+}
+
+uint64_t expectedImageMemory(std::span<const Material> materials, uint64_t textureBytes) {
+    std::set<ImageKey> known;
+    uint64_t rows = 0, textures = 0;
+    for (const Material& material : materials) {
+        if (!material.image.exists() || !known.insert(keyOf(material.image)).second) continue;
+        const auto image = openImage(material.image);
+        if (!image) continue;
+        rows = std::max(rows, memoryFor(**image));
+        textures += Texture::bytesOf((*image)->size());
+    }
+    return rows + std::min(textures, textureBytes);
 }
 
 double expectedImageSeconds(uint64_t bytes) { return kSecondsOfByte * double(bytes); }

@@ -30,6 +30,9 @@ Result<std::vector<PlacedMaterial>> storeImages(std::span<const Material> materi
 
 /// Returns about how many bytes images of such materials take in a file, by the sizes of theirs; without reading them.
 uint64_t expectedImageBytes(std::span<const Material> materials);
+/// Returns about how much memory it takes to read images of such materials, one after the other, and to keep textures
+/// of them, of which all together have at most `textureBytes`; of each, the header is read.
+uint64_t expectedImageMemory(std::span<const Material> materials, uint64_t textureBytes);
 /// Returns about how long it takes to code images of so many expected bytes.
 double expectedImageSeconds(uint64_t bytes);
 

@@ -179,6 +179,26 @@ TEST(PngRows, InterlacedPicturesAreHeldAndRead) {
     EXPECT_EQ((*ImageRows::open(randomBytesAt(randomPng(size, 8, 2, "", 1)), {.bytes = 395}))->heldBytes(), 0u);
 }
 
+TEST(PngRows, SizesAndSumsThatLieAreFound) {
+    const auto refused = [](const std::string& file) { return ImageRows::open(randomBytesAt(file)).error(); };
+    for (const bool isInterlaced : {false, true})
+        EXPECT_EQ(refused(pngFile(32768, 32768, 8, 6, std::string(4'000'000, '\0'), "", isInterlaced)).code,
+                  ErrorCode::InvalidInput);
+    EXPECT_EQ(refused(pngFile(32769, 1, 8, 0, std::string(32770, '\0'))).code, ErrorCode::Limit);
+    std::mt19937 random(1);
+    std::string texels;
+    for (uint32_t i = 0; i < 600 * 65; ++i) texels += i % 65 == 0 ? '\0' : char(random());
+    const std::string file = pngFile(64, 600, 8, 0, texels);
+    EXPECT_FALSE(byRows(file, 256).empty());
+    EXPECT_TRUE(byRows(pngFile(64, 601, 8, 0, texels), 256).empty()) << "a row is missing";
+    const size_t data = file.find("IDAT"), end = file.find("IEND") - 4;
+    for (const size_t at : {data - 2, data + 100, (data + end) / 2, end - 2}) {
+        std::string broken = file;
+        broken[at] ^= 1;
+        EXPECT_TRUE(byRows(broken, 256).empty()) << at - data;
+    }
+}
+
 TEST(JpegRows, AreWhatLibjpegMakesOfAnyKind) {
     Image picture{131, 597, {}};
     std::mt19937 random(3);
