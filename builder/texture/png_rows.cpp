@@ -135,7 +135,7 @@ private:
 extern "C" {
 static void vcpPngRead(png_structp png, png_bytep to, size_t count) {
     if (!static_cast<PngRows*>(png_get_io_ptr(png))->take(reinterpret_cast<char*>(to), count))
-        png_error(png, "Read Error");
+        png_error(png, "it ends too early");
 }
 }
 
