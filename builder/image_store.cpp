@@ -157,6 +157,36 @@ std::optional<Error> tooLargeFor(uint64_t imageBytes, const ImageSource& source,
                                         size.x, size.y, (needed >> 20) + 1, imageBytes >> 20)});
 }
 
+/// Where images are coded to, and what with.
+struct ImageStore {
+    const BuildOptions& options;
+    uint64_t imageBytes;
+    PageSpool& work;
+    PageSpool& spool;
+    std::vector<std::string>& warnings;
+
+    /// Codes an image whose first tile has that number. Returns its row in the tables; nothing where it is left out.
+    /// Errors: as storeImages().
+    [[nodiscard]] Result<std::optional<ImageRow>> add(const Material& material, uint64_t firstTile,
+                                                      const std::function<bool(double)>& progress) const {
+        if (!progress(0)) return Error::cancelled();
+        const auto opened = openImage(material.image);
+        if (!opened) return std::optional<ImageRow>();
+        if (const auto tooLarge = tooLargeFor(imageBytes, material.image, **opened)) {
+            if (options.keepImages) return *tooLarge;
+            warnings.push_back(tooLarge->line() + "; it is left out");
+            return std::optional<ImageRow>();
+        }
+        CodedImage image(**opened, firstTile, options.imageQuality, work);
+        VCP_TRY_ASSIGN(const bool isCoded, image.code(progress));
+        if (isCoded) VCP_TRY(image.appendTo(spool));
+        work.remove();
+        if (!isCoded) return std::optional<ImageRow>();
+        const glm::uvec2 size = (*opened)->size();
+        return std::optional(ImageRow{size.x, size.y, uint32_t(image.levels().size()), kMixedTiles, firstTile});
+    }
+};
+
 }  // namespace
 
 Result<std::vector<PlacedMaterial>> storeImages(std::span<const Material> materials, const BuildOptions& options,
@@ -168,31 +198,19 @@ Result<std::vector<PlacedMaterial>> storeImages(std::span<const Material> materi
     ImageTables tables;
     uint64_t tiles = 0;
     PageSpool work(space, 0, "tile");
+    const ImageStore store{options, imageBytes, work, spool, warnings};
     for (size_t i = 0; i < materials.size(); ++i) {
         const Material& material = materials[i];
         if (!material.image.exists()) continue;
         const auto [number, isNew] = numbers.try_emplace(keyOf(material.image));
         if (isNew) {
-            const double begins = double(i) / double(materials.size());
-            if (!progress(begins)) return Error::cancelled();
-            const auto opened = openImage(material.image);
-            if (!opened) continue;
-            if (const auto tooLarge = tooLargeFor(imageBytes, material.image, **opened)) {
-                if (options.keepImages) return *tooLarge;
-                warnings.push_back(tooLarge->line() + "; it is left out");
-                continue;
-            }
-            CodedImage image(**opened, tiles, options.imageQuality, work);
-            VCP_TRY_ASSIGN(const bool isCoded,
-                           image.code([&](double part) { return progress(begins + part / double(materials.size())); }));
-            if (isCoded) {
-                VCP_TRY(image.appendTo(spool));
+            const auto part = [&](double done) { return progress((double(i) + done) / double(materials.size())); };
+            VCP_TRY_ASSIGN(const auto row, store.add(material, tiles, part));
+            if (row) {
                 number->second = uint32_t(tables.images.size());
-                const glm::uvec2 size = (*opened)->size();
-                tables.images.push_back({size.x, size.y, uint32_t(image.levels().size()), kMixedTiles, tiles});
-                tiles += tilesOf(image.levels());
+                tables.images.push_back(*row);
+                tiles += tilesOf(levelsOf(*row));
             }
-            work.remove();
         }
         if (!number->second) continue;
         const ImageRow& image = tables.images[*number->second];
