@@ -41,6 +41,8 @@ constexpr unsigned kBinsOfPart = 4;
 
 // Shares of the whole time; what is left after reading, dealing and the vertices is shared by the levels.
 constexpr double kReadingShare = 0.08, kDealingShare = 0.04, kVerticesShare = 0.06, kWritingShare = 0.02;
+// Images come on top of these, by what is expected of them and of the mesh.
+constexpr double kSecondsOfTriangle = 10e-6;
 
 class Builder {
 public:
@@ -138,8 +140,9 @@ private:
     bool progress(const std::string& stage, double fraction) {
         // What has parts ends with dealing.
         const double whole = parts_ == 0 ? 1 : kReadingShare + kDealingShare;
+        const double withImages = fraction / whole * (1 - imagesShare_) + imagesDone_;
         return meter_.report(
-            stage, {.fraction = fraction / whole, .triangles = measures_.triangles, .tempBytes = space_.diskBytes()});
+            stage, {.fraction = withImages, .triangles = measures_.triangles, .tempBytes = space_.diskBytes()});
     }
 
     Error cancelled() const { return Error::cancelled(options_.output.string()); }
@@ -281,8 +284,9 @@ private:
 
     /// Checks the free space now: a disk that is too small would be noticed only after hours.
     Result<void> checkSpace() const {
-        const uint64_t temp = expectedTempBytes(measures_.triangles, memory_.tempBytes), there = space_.diskBytes();
         const uint64_t images = mayKeepImages() ? expectedImageBytes(files_.soup->materials) : 0;
+        const uint64_t temp = expectedTempBytes(measures_.triangles, images, memory_.tempBytes),
+                       there = space_.diskBytes();
         const std::array<SpaceNeed, 2> needs{
             {{space_.folder().path(), temp > there ? temp - there : 0, "temporary folder"},
              {options_.output, expectedFileBytes(measures_.triangles) + images, "folder"}}};
@@ -379,9 +383,17 @@ private:
         std::vector<PlacedMaterial> placed;
         if (!mayKeepImages()) return placed;
         openImages(1);
-        const double begins = kReadingShare + kDealingShare / 2;
-        VCP_TRY_ASSIGN(placed, storeImages(files_.soup->materials, options_, memory_.vertexBytes, files_.images.front(),
-                                           report_.warnings, [&](double) { return progress("sorting", begins); }));
+        const double images = expectedImageSeconds(expectedImageBytes(files_.soup->materials));
+        imagesShare_ = images / (images + kSecondsOfTriangle * double(measures_.triangles));
+        const auto report = [&](double part) {
+            imagesDone_ = imagesShare_ * part;
+            return progress("images", kReadingShare + kDealingShare / 2);
+        };
+        // Nothing else takes the memory of pages yet.
+        VCP_TRY_ASSIGN(placed, storeImages(files_.soup->materials, options_, memory_.pageBytes, space_,
+                                           files_.images.front(), report_.warnings, report));
+        imagesDone_ = imagesShare_;
+        releaseMemory();
         if (!placed.empty()) openTextures();
         return placed;
     }
@@ -680,7 +692,8 @@ private:
     Journal journal_;
     Recorded done_;  ///< what an interrupted build recorded
     bool isResumed_ = false, partitionRecorded_ = false;
-    double lastCheckpoint_ = 0;  ///< seconds
+    double lastCheckpoint_ = 0;                ///< seconds
+    double imagesShare_ = 0, imagesDone_ = 0;  ///< of the whole time
     std::optional<tbb::global_control> more_;
     tbb::task_arena arena_;
 

@@ -42,7 +42,7 @@ enum class CoarseLeaves { Slabs, Mesh };
 enum class VertexNormals { Mesh, Computed };
 
 struct BuildProgress {
-    std::string stage = {};  ///< "reading", "sorting", "level 5 of 6", "writing", "done"
+    std::string stage = {};  ///< "reading", "images", "sorting", "level 5 of 6", "writing", "done"
     double fraction = 0;     ///< fraction of the whole build, 0 to 1, never decreasing; 1: done
     uint64_t triangles = 0;  ///< read so far
     uint64_t tempBytes = 0;  ///< on the temporary disk now

@@ -102,8 +102,8 @@ private:
 
 }  // namespace
 
-uint64_t expectedTempBytes(uint64_t triangles, uint64_t heldInMemory) {
-    const auto bytes = uint64_t(kTempBytesPerTriangle * double(triangles));
+uint64_t expectedTempBytes(uint64_t triangles, uint64_t imageBytes, uint64_t heldInMemory) {
+    const uint64_t bytes = uint64_t(kTempBytesPerTriangle * double(triangles)) + imageBytes;
     return bytes > heldInMemory ? bytes : 0;
 }
 
@@ -164,7 +164,7 @@ Result<BuildEstimate> estimateBuild(const BuildOptions& options) {
     SoupMeasures& m = estimate.measures;
     m.boundsMin = glm::dvec3(std::numeric_limits<double>::infinity());
     m.boundsMax = -m.boundsMin;
-    uint64_t measured = 0, imageBytes = 0;
+    uint64_t measured = 0, imageBytes = 0, imageMemory = 0;
     MeshChunk chunk;
     BuildSample sample;
     const auto begins = std::chrono::steady_clock::now();
@@ -179,7 +179,10 @@ Result<BuildEstimate> estimateBuild(const BuildOptions& options) {
             if (options.progress && !options.progress({.stage = "reading", .fraction = 0, .triangles = m.triangles}))
                 return Error::cancelled();
         }
-        if (keepsImages(options)) imageBytes += expectedImageBytes(stream->materials());
+        if (keepsImages(options)) {
+            imageBytes += expectedImageBytes(stream->materials());
+            imageMemory = std::max(imageMemory, expectedImageMemory(stream->materials(), plan.vertexBytes));
+        }
         measured += measurer.measured();
         m.area += measurer.area();
         m.length += measurer.length();
@@ -201,18 +204,18 @@ Result<BuildEstimate> estimateBuild(const BuildOptions& options) {
     if (options.errorIsRelative) whole.error *= glm::length(m.boundsMax - m.boundsMin);
     const ColourUse use = colourUseOf(options, m);
     VCP_TRY_ASSIGN(const auto figures, buildSample(whole, estimate.frame.cell, sample, use.vertices));
+    if (!use.materials) imageBytes = imageMemory = 0;
     estimate.memoryBytes =
-        std::min(estimate.memoryCap, fixedMemoryBytes(threads) +
+        std::min(estimate.memoryCap, fixedMemoryBytes(threads) + imageMemory +
                                          uint64_t(kFirstMemoryBytes + kMemoryBytesPerTriangle * double(m.triangles)));
-    if (!use.materials) imageBytes = 0;
     double bytesPerTriangle = figures.fileBytes;
     if (use.materials) bytesPerTriangle += kImageBytesPerTriangle;
     if (imageBytes > 0) bytesPerTriangle += kPlaceBytesPerTriangle;
     estimate.fileBytes = uint64_t(bytesPerTriangle * double(m.triangles)) + imageBytes;
-    estimate.seconds = reading + figures.seconds * double(m.triangles);
+    estimate.seconds = reading + figures.seconds * double(m.triangles) + expectedImageSeconds(imageBytes);
     // A checkpoint writes all that is held in memory.
     const bool mayCheckpoint = kSlower * estimate.seconds > options.checkpointSeconds;
-    estimate.tempBytes = expectedTempBytes(m.triangles, mayCheckpoint ? 0 : plan.tempBytes);
+    estimate.tempBytes = expectedTempBytes(m.triangles, imageBytes, mayCheckpoint ? 0 : plan.tempBytes);
     estimate.freeTempBytes = freeBytesAt(tempFolderOf(options));
     estimate.freeOutputBytes = freeBytesAt(options.output);
     return estimate;

@@ -26,8 +26,9 @@ struct BuildEstimate {
     uint64_t freeTempBytes = 0, freeOutputBytes = 0;  ///< free bytes on the disks they would go to
 };
 
-/// Returns the most bytes on the temporary disk, and the bytes of the file, for so many triangles.
-uint64_t expectedTempBytes(uint64_t triangles, uint64_t heldInMemory);
+/// Returns the most bytes on the temporary disk, and the bytes of the file, for so many triangles. `imageBytes`: what
+/// images take in the file.
+uint64_t expectedTempBytes(uint64_t triangles, uint64_t imageBytes, uint64_t heldInMemory);
 uint64_t expectedFileBytes(uint64_t triangles);
 
 /// Returns the free bytes where `path`, or the folder it will be in, lies; the largest number when that is unknown.

@@ -1,10 +1,13 @@
-// make_scan: writes a procedural scan of any size as a binary PLY file, or a dog as an OBJ, to a file or a pipe.
+// make_scan: writes a procedural scan of any size as a binary PLY file, or a dog as an OBJ, to a file or a pipe; or a
+// scan with a picture, as an OBJ with what belongs to it.
+#include <array>
 #include <cerrno>
 #include <charconv>
 #include <csignal>
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
+#include <fstream>
 #include <memory>
 #include <optional>
 #include <string>
@@ -16,6 +19,7 @@
 
 #include "datasets_scripts/dog.h"
 #include "datasets_scripts/scan_mesh.h"
+#include "datasets_scripts/test_picture.h"
 #include "octree/io/durable_file.h"
 #include "octree/io/output_file.h"
 
@@ -28,7 +32,8 @@ constexpr std::string_view kHelp =
     "make_scan: writes a procedural statue as a binary PLY file, as a scanner might have left it:\n"
     "carved, noisy, with thin parts, slivers, an open border, holes and overlapping passes.\n"
     "\n"
-    "usage: make_scan [--shape statue|dog] [--triangles N] [--seed S] [--colour] [--utm] [--parts] -o FILE|-\n"
+    "usage: make_scan [--shape statue|dog] [--triangles N] [--seed S] [--colour] [--utm] [--texture EDGE [--jpeg]]\n"
+    "                 [--parts] -o FILE|-\n"
     "\n"
     "  --shape dog    a dog as an OBJ with texture coordinates, to lay mesostructure on: about N triangles, 10k to "
     "200k,\n"
@@ -37,6 +42,9 @@ constexpr std::string_view kHelp =
     "  --seed S       another pose, other folds, other stone (1); the same seed gives the same bytes\n"
     "  --colour       vertex colours\n"
     "  --utm          double positions, z up, with an origin in UTM coordinates\n"
+    "  --texture EDGE an OBJ with its MTL and a picture of EDGE x EDGE texels (256 to 32768) in cells with their\n"
+    "                 numbers: -o scan.obj writes scan.mtl and scan.png, too; without --colour and --utm\n"
+    "  --jpeg         scan.jpg instead\n"
     "  --parts        prints the parts and their counts on stderr\n"
     "  -o FILE|-      the file to write, or - for a pipe\n"
     "  --help         this text\n"
@@ -46,6 +54,8 @@ constexpr std::string_view kHelp =
 struct Arguments {
     ScanOptions scan;
     std::string out;
+    uint32_t pictureEdge = 0;  ///< texels; 0: no picture
+    PictureKind picture = PictureKind::Png;
     bool help = false, parts = false, isDog = false,
          isStatueOnly = false;  ///< isStatueOnly: an option of the statue was given
 };
@@ -68,11 +78,13 @@ Result<Arguments> parse(int argc, char** argv) {
     Arguments arguments;
     for (int i = 1; i < argc; ++i) {
         const std::string_view option = argv[i];
-        const bool takesValue = option == "--shape" || option == "--triangles" || option == "--seed" || option == "-o";
+        const bool takesValue = option == "--shape" || option == "--triangles" || option == "--seed" ||
+                                option == "--texture" || option == "-o";
         if (takesValue && i + 1 == argc)
             return Error{.code = ErrorCode::Usage, .message = std::string(option) + " wants a value"};
         arguments.isStatueOnly = arguments.isStatueOnly || option == "--seed" || option == "--colour" ||
-                                 option == "--utm" || option == "--parts";
+                                 option == "--utm" || option == "--parts" || option == "--texture" ||
+                                 option == "--jpeg";
         if (option == "--help" || option == "-h")
             arguments.help = true;
         else if (option == "--colour")
@@ -81,6 +93,8 @@ Result<Arguments> parse(int argc, char** argv) {
             arguments.scan.utm = true;
         else if (option == "--parts")
             arguments.parts = true;
+        else if (option == "--jpeg")
+            arguments.picture = PictureKind::Jpeg;
         else if (option == "-o")
             arguments.out = argv[++i];
         else if (option == "--shape") {
@@ -93,6 +107,9 @@ Result<Arguments> parse(int argc, char** argv) {
             VCP_TRY_ASSIGN(arguments.scan.triangles, number(option, argv[++i], kMinTriangles, kMaxTriangles));
         } else if (option == "--seed") {
             VCP_TRY_ASSIGN(arguments.scan.seed, number(option, argv[++i], 0, UINT64_MAX));
+        } else if (option == "--texture") {
+            VCP_TRY_ASSIGN(const uint64_t edge, number(option, argv[++i], kMinPictureEdge, kMaxPictureEdge));
+            arguments.pictureEdge = uint32_t(edge);
         } else
             return Error{.code = ErrorCode::Usage,
                          .message = "unknown option '" + std::string(option) + "'; see make_scan --help"};
@@ -100,7 +117,12 @@ Result<Arguments> parse(int argc, char** argv) {
     if (!arguments.help && arguments.out.empty())
         return Error{.code = ErrorCode::Usage, .message = "-o FILE is missing (or -o - for a pipe)"};
     if (arguments.isDog && arguments.isStatueOnly)
-        return Error{.code = ErrorCode::Usage, .message = "--seed, --colour, --utm and --parts are of the statue"};
+        return Error{.code = ErrorCode::Usage,
+                     .message = "--seed, --colour, --utm, --texture, --jpeg and --parts are of the statue"};
+    if (arguments.picture == PictureKind::Jpeg && arguments.pictureEdge == 0)
+        return Error{.code = ErrorCode::Usage, .message = "--jpeg wants --texture EDGE"};
+    if (arguments.pictureEdge > 0 && (arguments.scan.colour || arguments.scan.utm || arguments.out == "-"))
+        return Error{.code = ErrorCode::Usage, .message = "--texture goes without --colour, --utm and a pipe"};
     if (arguments.isDog && arguments.scan.triangles > kMostDogTriangles)
         return Error{.code = ErrorCode::Usage,
                      .message = "a dog has at most " + std::to_string(kMostDogTriangles) + " triangles"};
@@ -161,18 +183,52 @@ Result<void> writeStatue(const Arguments& arguments, const Output& output) {
     return mesh.writePly([&](std::span<const std::byte> bytes) { return output.write(bytes); });
 }
 
+/// Whether there is a JPEG of that name, which may be replaced.
+bool isJpegFile(const std::filesystem::path& path) {
+    std::array<char, 2> begin{};
+    std::ifstream(path, std::ios::binary).read(begin.data(), begin.size());
+    return begin == std::array<char, 2>{'\xFF', '\xD8'};
+}
+
+/// Writes the picture and the material that has it.
+Result<void> writePicture(const Arguments& arguments) {
+    const bool isPng = arguments.picture == PictureKind::Png;
+    std::filesystem::path picture = arguments.out, materials = arguments.out;
+    picture.replace_extension(isPng ? ".png" : ".jpg");
+    materials.replace_extension(".mtl");
+    VCP_TRY_ASSIGN(auto file,
+                   OutputFile::create(picture, OutputKind::Png, {.overwrite = !isPng && isJpegFile(picture)}));
+    VCP_TRY(writeTestPicture(arguments.pictureEdge, arguments.picture,
+                             [&](std::span<const std::byte> bytes) { return file.append(bytes); }));
+    VCP_TRY(file.commit());
+    VCP_TRY_ASSIGN(auto text, OutputFile::create(materials, OutputKind::Text));
+    const std::string lines = "newmtl scan\nKd 1 1 1\nmap_Kd " + picture.filename().string() + "\n";
+    VCP_TRY(text.append(std::as_bytes(std::span(lines))));
+    return text.commit();
+}
+
+Result<void> writeTextured(const Arguments& arguments, const Output& output) {
+    const ScanMesh mesh(arguments.scan);
+    if (arguments.parts) printParts(mesh);
+    VCP_TRY(writePicture(arguments));
+    const std::string materials = std::filesystem::path(arguments.out).replace_extension(".mtl").filename().string();
+    return mesh.writeObj([&](std::span<const std::byte> bytes) { return output.write(bytes); }, materials);
+}
+
 Result<void> run(const Arguments& arguments) {
-    const OutputKind kind = arguments.isDog ? OutputKind::Obj : OutputKind::Ply;
+    const bool isObj = arguments.isDog || arguments.pictureEdge > 0;
+    const OutputKind kind = isObj ? OutputKind::Obj : OutputKind::Ply;
     if (const auto named = outputKindOf(arguments.out); named && *named != kind)
         return Error{.code = ErrorCode::Usage,
                      .message = std::string("what is written is ") +
-                                (arguments.isDog ? "an OBJ: -o must end in .obj" : "a PLY: -o must end in .ply") +
+                                (isObj ? "an OBJ: -o must end in .obj" : "a PLY: -o must end in .ply") +
                                 ", or be - for a pipe"};
     VCP_TRY_ASSIGN(auto output, Output::open(arguments.out, kind));
     auto result = arguments.isDog
                       ? writeObj(dog(arguments.scan.triangles),
                                  [&](std::string_view text) { return output.write(std::as_bytes(std::span(text))); })
-                      : writeStatue(arguments, output);
+                  : arguments.pictureEdge > 0 ? writeTextured(arguments, output)
+                                              : writeStatue(arguments, output);
     if (result) result = output.finish();
     return result;
 }

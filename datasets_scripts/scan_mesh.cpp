@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <cstdio>
 #include <cstring>
 
 #include "datasets_scripts/procedural_noise.h"
@@ -100,14 +101,19 @@ private:
     Result<void> result_;
 };
 
+/// Returns where the scanner saw a vertex.
+glm::dvec3 seenAt(const ScanOptions& options, double noise, const SurfacePoint& point, uint64_t number) {
+    const uint64_t h = hash(hash(options.seed) ^ number);
+    return point.position + noise * glm::dvec3(signedUnit(h), signedUnit(h, 21), signedUnit(h, 42));
+}
+
 class VertexWriter {
 public:
     VertexWriter(const ScanOptions& options, double noise, Buffer& buffer)
         : options_(options), noise_(noise), buffer_(buffer) {}
 
     bool put(const SurfacePoint& point, uint64_t number) {
-        const uint64_t h = hash(hash(options_.seed) ^ number);
-        const glm::dvec3 p = point.position + noise_ * glm::dvec3(signedUnit(h), signedUnit(h, 21), signedUnit(h, 42));
+        const glm::dvec3 p = seenAt(options_, noise_, point, number);
         const size_t coordinates = options_.utm ? 24 : 12;
         std::byte* out = buffer_.claim(coordinates + (options_.colour ? 3 : 0));
         if (!out) return false;
@@ -130,9 +136,11 @@ private:
     Buffer& buffer_;
 };
 
-bool putVertices(const GridPart& grid, VertexWriter& writer) {
+/// Calls put(point, number) for each vertex, until it returns false. Returns whether it never did.
+template <class Put>
+bool forEachVertex(const GridPart& grid, Put&& putPoint) {
     uint64_t number = grid.firstVertex;
-    const auto put = [&](double u, double v) { return writer.put(grid.part.shape(u, v), number++); };
+    const auto put = [&](double u, double v) { return putPoint(grid.part.shape(u, v), number++); };
     const auto columns = double(grid.columns), rows = double(grid.rows);
     switch (grid.part.topology) {
         case Topology::Capped:
@@ -159,52 +167,90 @@ bool putVertices(const GridPart& grid, VertexWriter& writer) {
     return true;
 }
 
-bool putTriangles(const GridPart& grid, Buffer& buffer) {
+/// A corner of a triangle: its vertex, numbered in the part, and where it is in the part's square. Where a part closes,
+/// its last corners have the vertices of the first.
+struct Corner {
+    uint64_t vertex;
+    double u, v;
+};
+
+/// Calls put(a, b, c) for each triangle, until it returns false. Returns whether it never did.
+template <class Put>
+bool forEachTriangle(const GridPart& grid, Put&& put) {
     bool going = true;
-    const auto put = [&](uint64_t a, uint64_t b, uint64_t c) {
-        std::byte* out = buffer.claim(13);
-        going = out != nullptr;
-        if (!going) return;
-        const uint32_t corners[3] = {uint32_t(grid.firstVertex + a), uint32_t(grid.firstVertex + b),
-                                     uint32_t(grid.firstVertex + c)};
-        out[0] = std::byte{3};
-        std::memcpy(out + 1, corners, sizeof corners);
-    };
-    const auto quad = [&](uint64_t a, uint64_t b, uint64_t c, uint64_t d) {
-        put(a, b, c);
-        if (going) put(a, c, d);
+    const auto quad = [&](const Corner& a, const Corner& b, const Corner& c, const Corner& d) {
+        going = put(a, b, c) && put(a, c, d);
     };
     const uint64_t columns = grid.columns, rows = grid.rows;
+    const auto part = [](uint64_t i, uint64_t count) { return double(i) / double(count); };
     switch (grid.part.topology) {
         case Topology::Capped: {
-            const auto at = [&](uint64_t row, uint64_t column) { return 1 + row * columns + column % columns; };
-            for (uint64_t i = 0; i < columns && going; ++i) put(0, at(0, i + 1), at(0, i));
+            const auto at = [&](uint64_t row, uint64_t column) {
+                return Corner{1 + row * columns + column % columns, part(column, columns), part(row + 1, rows + 1)};
+            };
+            const auto pole = [&](uint64_t vertex, uint64_t i, double v) {
+                return Corner{vertex, (double(i) + 0.5) / double(columns), v};
+            };
+            for (uint64_t i = 0; i < columns && going; ++i) going = put(pole(0, i, 0), at(0, i + 1), at(0, i));
             for (uint64_t row = 0; row + 1 < rows; ++row)
                 for (uint64_t i = 0; i < columns && going; ++i)
                     quad(at(row, i), at(row, i + 1), at(row + 1, i + 1), at(row + 1, i));
             for (uint64_t i = 0; i < columns && going; ++i)
-                put(1 + rows * columns, at(rows - 1, i), at(rows - 1, i + 1));
+                going = put(pole(1 + rows * columns, i, 1), at(rows - 1, i), at(rows - 1, i + 1));
             break;
         }
         case Topology::Torus: {
-            const auto at = [&](uint64_t row, uint64_t column) { return row % rows * columns + column % columns; };
+            const auto at = [&](uint64_t row, uint64_t column) {
+                return Corner{row % rows * columns + column % columns, part(column, columns), part(row, rows)};
+            };
             for (uint64_t row = 0; row < rows; ++row)
                 for (uint64_t i = 0; i < columns && going; ++i)
                     quad(at(row, i), at(row, i + 1), at(row + 1, i + 1), at(row + 1, i));
             break;
         }
-        case Topology::Sheet:
+        case Topology::Sheet: {
+            const auto at = [&](uint64_t row, uint64_t column) {
+                return Corner{row * columns + column, part(column, columns - 1), part(row, rows - 1)};
+            };
             forEachQuad(grid, [&](uint64_t row, uint64_t i) {
-                const uint64_t a = row * columns + i;
-                if (going) quad(a, a + 1, a + columns + 1, a + columns);
+                if (going) quad(at(row, i), at(row, i + 1), at(row + 1, i + 1), at(row + 1, i));
             });
             break;
-        case Topology::Strip:
-            for (uint64_t i = 0; i < grid.triangles && going; ++i) put(i, i + 1 + i % 2, i + 2 - i % 2);
+        }
+        case Topology::Strip: {
+            const auto at = [&](uint64_t i) { return Corner{i, part(i, columns - 1), double(i % 2)}; };
+            for (uint64_t i = 0; i < grid.triangles && going; ++i)
+                going = put(at(i), at(i + 1 + i % 2), at(i + 2 - i % 2));
             break;
+        }
     }
     return going;
 }
+
+bool putTriangles(const GridPart& grid, Buffer& buffer) {
+    return forEachTriangle(grid, [&](const Corner& a, const Corner& b, const Corner& c) {
+        std::byte* out = buffer.claim(13);
+        if (!out) return false;
+        const uint32_t corners[3] = {uint32_t(grid.firstVertex + a.vertex), uint32_t(grid.firstVertex + b.vertex),
+                                     uint32_t(grid.firstVertex + c.vertex)};
+        out[0] = std::byte{3};
+        std::memcpy(out + 1, corners, sizeof corners);
+        return true;
+    });
+}
+
+/// The square of a part in the picture: parts lie in rows, a hundredth apart.
+struct Chart {
+    double left, top, edge;
+
+    Chart(size_t number, size_t parts) {
+        const auto across = uint64_t(std::ceil(std::sqrt(double(parts))));
+        const double cell = 1.0 / double(across);
+        edge = 0.98 * cell;
+        left = double(number % across) * cell + 0.01 * cell;
+        top = double(number / across) * cell + 0.01 * cell;
+    }
+};
 
 }  // namespace
 
@@ -252,9 +298,52 @@ Result<void> ScanMesh::writePly(const Write& write) const {
     Buffer buffer(write);
     VertexWriter vertices(options_, std::min(kScannerNoise, 0.12 * edge()), buffer);
     for (const GridPart& grid : parts_)
-        if (!putVertices(grid, vertices)) return buffer.result();
+        if (!forEachVertex(grid, [&](const SurfacePoint& p, uint64_t i) { return vertices.put(p, i); }))
+            return buffer.result();
     for (const GridPart& grid : parts_)
         if (!putTriangles(grid, buffer)) return buffer.result();
+    buffer.flush();
+    return buffer.result();
+}
+
+Result<void> ScanMesh::writeObj(const Write& write, const std::string& materials) const {
+    Buffer buffer(write);
+    char line[256];
+    const auto put = [&](int size) {
+        std::byte* out = buffer.claim(size_t(size));
+        if (out) std::memcpy(out, line, size_t(size));
+        return out != nullptr;
+    };
+    put(std::snprintf(line, sizeof line, "# procedural statue, seed %llu\nmtllib %.200s\nusemtl scan\n",
+                      static_cast<unsigned long long>(options_.seed), materials.c_str()));
+    const double noise = std::min(kScannerNoise, 0.12 * edge());
+    const auto putVertex = [&](const SurfacePoint& point, uint64_t number) {
+        const glm::dvec3 p = seenAt(options_, noise, point, number);
+        return put(std::snprintf(line, sizeof line, "v %.6f %.6f %.6f\n", p.x, p.y, p.z));
+    };
+    for (const GridPart& grid : parts_)
+        if (!forEachVertex(grid, putVertex)) return buffer.result();
+    uint64_t places = 0;
+    for (size_t i = 0; i < parts_.size(); ++i) {
+        const Chart chart(i, parts_.size());
+        const auto putPlace = [&](const Corner& corner) {
+            // A picture's rows come from the top, and coordinates count from below; seen from outside, u runs to the
+            // left.
+            return put(std::snprintf(line, sizeof line, "vt %.8f %.8f\n", chart.left + chart.edge * (1 - corner.u),
+                                     1 - (chart.top + chart.edge * corner.v)));
+        };
+        const auto putTriangle = [&](const Corner& a, const Corner& b, const Corner& c) {
+            const auto number = [&](const Corner& corner) {
+                return static_cast<unsigned long long>(parts_[i].firstVertex + corner.vertex + 1);
+            };
+            const auto place = static_cast<unsigned long long>(places);
+            places += 3;
+            return putPlace(a) && putPlace(b) && putPlace(c) &&
+                   put(std::snprintf(line, sizeof line, "f %llu/%llu %llu/%llu %llu/%llu\n", number(a), place + 1,
+                                     number(b), place + 2, number(c), place + 3));
+        };
+        if (!forEachTriangle(parts_[i], putTriangle)) return buffer.result();
+    }
     buffer.flush();
     return buffer.result();
 }

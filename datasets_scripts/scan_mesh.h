@@ -1,4 +1,4 @@
-// ScanMesh: the statue tessellated into an exact number of triangles and streamed as a PLY file.
+// ScanMesh: the statue tessellated into an exact number of triangles and streamed as a PLY or OBJ file.
 //
 // Every count follows from the part's grid before a vertex is computed, so the header comes first and
 // nothing is kept: memory is one buffer, whatever the number of triangles.
@@ -47,6 +47,9 @@ public:
 
     /// Hands the whole file to `write`, at most kBufferBytes at a time, and returns its first error.
     [[nodiscard]] Result<void> writePly(const Write& write) const;
+    /// Does so with an OBJ whose triangles have places in a picture, each part in a square of its own; no colour, no
+    /// UTM. `materials`: the name of its MTL file, whose material is called scan.
+    [[nodiscard]] Result<void> writeObj(const Write& write, const std::string& materials) const;
 
     static constexpr size_t kBufferBytes = 1 << 20;
 

@@ -25,10 +25,10 @@ bool isOfABuild(std::string_view name) {
     if (!name.ends_with(kTempSuffix)) return false;
     name.remove_suffix(std::string_view(kTempSuffix).size());
     name = name.substr(0, name.find_last_not_of("0123456789") + 1);
-    constexpr std::string_view kWords[] = {"floats",         "doubles",  "vertices",   "waiting",
-                                           "level",          "normals",  "parts",      "keptpages",
-                                           "keptentries",    "pages",    "entries",    "surfacepages",
-                                           "surfaceentries", "textures", "imagepages", "imageentries"};
+    constexpr std::string_view kWords[] = {
+        "floats",         "doubles",   "vertices",    "waiting",      "level",     "normals",
+        "parts",          "keptpages", "keptentries", "pages",        "entries",   "surfacepages",
+        "surfaceentries", "textures",  "imagepages",  "imageentries", "tilepages", "tileentries"};
     return std::find(std::begin(kWords), std::end(kWords), name) != std::end(kWords);
 }
 

@@ -51,7 +51,11 @@ private:
 
 class MemoryBytes final : public RandomBytes {
 public:
-    explicit MemoryBytes(std::string bytes) : bytes_(std::move(bytes)) {}
+    explicit MemoryBytes(std::string bytes) : owned_(std::move(bytes)), bytes_(owned_) {}
+    explicit MemoryBytes(std::string_view bytes) : bytes_(bytes) {}
+    MemoryBytes(const MemoryBytes&) = delete;
+    MemoryBytes& operator=(const MemoryBytes&) = delete;
+
     [[nodiscard]] uint64_t size() const override { return bytes_.size(); }
     Result<void> read(uint64_t offset, char* to, size_t count) override {
         if (count > 0) std::memcpy(to, bytes_.data() + offset, count);
@@ -59,7 +63,8 @@ public:
     }
 
 private:
-    std::string bytes_;
+    std::string owned_;
+    std::string_view bytes_;
 };
 
 }  // namespace
@@ -84,6 +89,8 @@ Result<std::unique_ptr<RandomBytes>> openRandomBytes(const std::filesystem::path
 std::unique_ptr<RandomBytes> randomBytesOf(std::string bytes) {
     return std::make_unique<MemoryBytes>(std::move(bytes));
 }
+
+std::unique_ptr<RandomBytes> randomBytesAt(std::string_view bytes) { return std::make_unique<MemoryBytes>(bytes); }
 
 Result<void> Spool::append(std::string_view bytes) {
     if (!file_.isOpen() && size_ + bytes.size() > memoryBytes_) VCP_TRY(moveToFile());

@@ -28,6 +28,8 @@ public:
 Result<std::unique_ptr<RandomBytes>> openRandomBytes(const std::filesystem::path& path, uint64_t offset = 0);
 
 std::unique_ptr<RandomBytes> randomBytesOf(std::string bytes);
+/// Reads bytes that stay where they are as long as it is used.
+std::unique_ptr<RandomBytes> randomBytesAt(std::string_view bytes);
 
 /// Bytes appended one after another, then read anywhere: in memory up to `memoryBytes`, beyond that in a file
 /// without a name in `folder` (empty: the system's folder for temporary files), which vanishes with the process.

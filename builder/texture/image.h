@@ -1,16 +1,22 @@
-// Decodes pictures as mesh files bring them: PNG and JPEG, with limits. Hostile bytes are an error, never a crash.
+// Decodes pictures as mesh files bring them: PNG and JPEG, with limits, as a whole or some rows at a time. Hostile
+// bytes are an error, never a crash.
 #pragma once
 
 #include <cstdint>
 #include <memory>
-#include <string>
+#include <span>
 #include <string_view>
 #include <vector>
 
+#include <glm/vec2.hpp>
+
 #include "builder/stream/material.h"
+#include "builder/stream/random_bytes.h"
 #include "octree/io/result.h"
 
 namespace vcp {
+
+class JpegBlocks;
 
 struct Image {
     uint32_t width = 0;
@@ -20,22 +26,42 @@ struct Image {
 
 struct ImageLimits {
     uint32_t edge = 32768;                 ///< texels along an edge
-    uint64_t bytes = uint64_t{512} << 20;  ///< bytes of the decoded texels
-    uint64_t fileBytes = uint64_t{256} << 20;
+    uint64_t bytes = uint64_t{512} << 20;  ///< bytes of decoded texels that are held together
+    uint64_t fileBytes = uint64_t{2} << 30;
 };
 
-/// Decodes PNG (any type, 16 bits cut to 8) or JPEG (grey, RGB; baseline and progressive). Sizes are checked before
-/// texels are allocated, against the limits and against what as many bytes can hold. Errors: InvalidInput (damaged,
-/// truncated), Unsupported (another format, CMYK), Limit (also a JPEG of more than 100 scans, and a progressive one of
-/// more than 256 MiB); without file.
+/// A picture that is decoded from the top, some rows at a time: PNG (any type, 16 bits cut to 8) or JPEG (grey, RGB;
+/// baseline and progressive). What is held is a few rows, but all texels of an interlaced PNG and all blocks of a JPEG
+/// of several scans (a progressive one is). One thread at a time.
+class ImageRows {
+public:
+    /// Reads the header. Sizes are checked against the limits and against what as many bytes can hold. Errors, without
+    /// file: InvalidInput (damaged), Unsupported (another format, CMYK), Limit (an edge, the bytes of an interlaced
+    /// PNG; blocks of more than 256 MiB), Io.
+    static Result<std::unique_ptr<ImageRows>> open(std::unique_ptr<RandomBytes> file, const ImageLimits& limits = {});
+    virtual ~ImageRows() = default;
+
+    /// Texels along both axes.
+    [[nodiscard]] virtual glm::uvec2 size() const = 0;
+    /// Returns the most bytes that are held while it is read.
+    [[nodiscard]] virtual uint64_t heldBytes() const = 0;
+    /// Decodes the next rows into `texels`, a whole number of them. Precondition: as many are left. Errors, without
+    /// file: InvalidInput (damaged, truncated), Limit (a JPEG of more than 100 scans), Io; no more can be read then.
+    virtual Result<void> read(std::span<Rgba8> texels) = 0;
+    /// Returns the blocks of a JPEG once a row was read; nullptr where they cannot be cut into tiles.
+    [[nodiscard]] virtual const JpegBlocks* blocks() const { return nullptr; }
+};
+
+/// Opens the file that `source` names, or its bytes, which `source` keeps while rows are read. Errors: as
+/// ImageRows::open() and Limit (too large a file); with the file's name.
+Result<std::unique_ptr<ImageRows>> openImage(const ImageSource& source, const ImageLimits& limits = {});
+
+/// Decodes a picture as a whole; its texels are limited, too. Errors: as ImageRows'; without file.
 Result<Image> decodeImage(std::string_view file, const ImageLimits& limits = {});
-
-/// Reads the file that `source` names, or returns its bytes. Errors: Io, Limit (too large); with the file's name.
-Result<std::shared_ptr<const std::string>> imageFile(const ImageSource& source, const ImageLimits& limits = {});
-
-/// Reads and decodes it. Errors: as imageFile() and decodeImage(); with the file's name.
+/// Decodes the one that `source` names. Errors: as ImageRows' and openImage(); with the file's name.
 Result<Image> loadImage(const ImageSource& source, const ImageLimits& limits = {});
-/// Decodes what imageFile() returned of `source`. Errors: as decodeImage(); with the file's name.
-Result<Image> decodeImage(const ImageSource& source, const std::string& file, const ImageLimits& limits = {});
+
+/// Adds the file's name to an error of a picture.
+Error namedImageError(const ImageSource& source, Error error);
 
 }  // namespace vcp

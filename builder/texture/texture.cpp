@@ -5,64 +5,16 @@
 #include <cmath>
 #include <utility>
 
-#include "builder/stream/colour_encoding.h"
+#include "builder/texture/level_bands.h"
+#include "builder/texture/texel_light.h"
 
 namespace vcp {
 namespace {
 
-using Light = std::array<double, 4>;
-
-// Adds a texel's linear colour, weighted by its alpha.
-void add(Light& sum, Rgba8 texel, double weight) {
-    const auto& table = lightOfByte();
-    const double alpha = weight * (texel >> 24) / 255;
-    for (int c = 0; c < 3; ++c) sum[size_t(c)] += alpha * table[texel >> (8 * c) & 0xFF];
-    sum[3] += alpha;
-}
+using Light = TexelLight;
 
 void add(Light& sum, const Light& other, double weight) {
     for (size_t c = 0; c < 4; ++c) sum[c] += weight * other[c];
-}
-
-// Encodes a sum of weights 1 as it is stored; colour without alpha does not matter.
-Rgba8 encoded(const Light& sum) {
-    if (!(sum[3] > 0)) return 0;
-    return encodeRgba({sum[0] / sum[3], sum[1] / sum[3], sum[2] / sum[3], sum[3]});
-}
-
-// Which of the `size` finer texels one texel of half as many covers.
-struct Span {
-    uint32_t first;
-    std::array<double, 3> weights;  // weights of up to three texels; their sum is 1
-};
-
-Span coverage(uint32_t coarse, uint32_t coarseSize, uint32_t size) {
-    const double step = double(size) / coarseSize;
-    const double begin = coarse * step, end = (coarse + 1) * step;
-    Span span{std::min(uint32_t(begin), size - 1), {}};
-    for (uint32_t i = 0; i < 3 && span.first + i < size; ++i) {
-        const double covered = std::min(end, double(span.first + i + 1)) - std::max(begin, double(span.first + i));
-        span.weights[i] = std::max(covered, 0.0) / step;
-    }
-    return span;
-}
-
-Image halved(const Image& fine) {
-    Image coarse{std::max(fine.width / 2, 1u), std::max(fine.height / 2, 1u), {}};
-    coarse.texels.reserve(size_t{coarse.width} * coarse.height);
-    for (uint32_t y = 0; y < coarse.height; ++y) {
-        const Span rows = coverage(y, coarse.height, fine.height);
-        for (uint32_t x = 0; x < coarse.width; ++x) {
-            const Span columns = coverage(x, coarse.width, fine.width);
-            Light sum{};
-            for (uint32_t j = 0; j < 3; ++j)
-                for (uint32_t i = 0; i < 3; ++i)
-                    if (const double weight = rows.weights[j] * columns.weights[i]; weight > 0)
-                        add(sum, fine.texels[size_t{rows.first + j} * fine.width + columns.first + i], weight);
-            coarse.texels.push_back(encoded(sum));
-        }
-    }
-    return coarse;
 }
 
 // A footprint in texels of the finest level.
@@ -96,13 +48,49 @@ uint32_t wrapped(double texel, uint32_t size, Wrap wrap) {
     return uint32_t(std::clamp(inside, 0.0, edge - 1));
 }
 
+uint64_t texelsOf(glm::uvec2 size) { return uint64_t{size.x} * size.y; }
+
 }  // namespace
 
 Texture::Texture() : Texture(Image{1, 1, {kWhite}}) {}
 
 Texture::Texture(Image image, Wrap wrapU, Wrap wrapV) : wrapU_(wrapU), wrapV_(wrapV) {
     levels_.push_back(std::move(image));
-    while (levels_.back().width > 1 || levels_.back().height > 1) levels_.push_back(halved(levels_.back()));
+    while (levels_.back().width > 1 || levels_.back().height > 1) {
+        const Image& fine = levels_.back();
+        const glm::uvec2 size = halvedSize({fine.width, fine.height});
+        Image coarse{size.x, size.y, std::vector<Rgba8>(size_t{size.x} * size.y)};
+        halveRows(fine.texels, 0, {fine.width, fine.height}, coarse.texels, 0);
+        levels_.push_back(std::move(coarse));
+    }
+}
+
+Result<Texture> Texture::read(ImageRows& image, Wrap wrapU, Wrap wrapV) {
+    Texture texture(std::vector<Image>(), wrapU, wrapV);
+    size_t finest = 0;
+    glm::uvec2 size = image.size();
+    for (; texelsOf(size) > kMostTexels; size = halvedSize(size)) ++finest;
+    const auto take = [&](size_t level, uint32_t, std::span<const Rgba8> texels) -> Result<void> {
+        if (level < finest) return {};
+        for (; texture.levels_.size() <= level - finest; size = halvedSize(size)) {
+            texture.levels_.push_back({size.x, size.y, {}});
+            texture.levels_.back().texels.reserve(texelsOf(size));
+        }
+        std::vector<Rgba8>& to = texture.levels_[level - finest].texels;
+        to.insert(to.end(), texels.begin(), texels.end());
+        return {};
+    };
+    VCP_TRY(readLevels(image, take));
+    return texture;
+}
+
+uint64_t Texture::bytesOf(glm::uvec2 size) {
+    while (texelsOf(size) > kMostTexels) size = halvedSize(size);
+    uint64_t bytes = 0;
+    for (;; size = halvedSize(size)) {
+        bytes += texelsOf(size) * sizeof(Rgba8);
+        if (size == glm::uvec2(1)) return bytes;
+    }
 }
 
 uint64_t Texture::bytes() const {
@@ -119,7 +107,7 @@ std::array<double, 4> Texture::bilinear(const Image& level, glm::dvec2 uv) const
     Light sum{};
     for (int j = 0; j < 2; ++j) {
         const Rgba8* row = &level.texels[size_t{wrapped(top + j, level.height, wrapV_)} * level.width];
-        for (int i = 0; i < 2; ++i) add(sum, row[columns[i]], (i ? fx : 1 - fx) * (j ? fy : 1 - fy));
+        for (int i = 0; i < 2; ++i) addTexel(sum, row[columns[i]], (i ? fx : 1 - fx) * (j ? fy : 1 - fy));
     }
     return sum;
 }
@@ -162,7 +150,7 @@ Rgba8 Texture::sample(glm::vec2 uv, const TextureFootprint& footprint) const {
             trilinear(glm::dvec2(uv) + ellipse.along * ((i + 0.5) / places - 0.5),
                       std::max(ellipse.width, ellipse.length / places)),
             1.0 / places);
-    return encoded(sum);
+    return encodedTexel(sum);
 }
 
 const Texture* TextureCache::textureOf(std::span<const Material> materials, uint32_t number) {
@@ -171,22 +159,32 @@ const Texture* TextureCache::textureOf(std::span<const Material> materials, uint
         loaded_.splice(loaded_.begin(), loaded_, found->second);
         return &loaded_.front().texture;
     }
-    const Material& material = materials[number];
-    auto image = loadImage(material.image, limits_);
-    if (!image) {
+    auto texture = load(materials[number]);
+    if (!texture) {
         broken_[number] = true;
-        warnings_.push_back(image.error().line() + "; material '" + material.name + "' has no texture");
+        warnings_.push_back(texture.error().line() + "; material '" + materials[number].name + "' has no texture");
         return nullptr;
     }
-    loaded_.push_front({number, Texture(*std::move(image), material.wrapU, material.wrapV)});
+    loaded_.push_front({number, *std::move(texture)});
     byMaterial_[number] = loaded_.begin();
     bytes_ += loaded_.front().texture.bytes();
-    while (bytes_ > memoryBytes_ && loaded_.size() > 1) {
+    return &loaded_.front().texture;
+}
+
+Result<Texture> TextureCache::load(const Material& material) {
+    VCP_TRY_ASSIGN(const auto image, openImage(material.image, limits_));
+    makeRoom(Texture::bytesOf(image->size()));
+    auto texture = Texture::read(*image, material.wrapU, material.wrapV);
+    if (!texture) return namedImageError(material.image, texture.error());
+    return texture;
+}
+
+void TextureCache::makeRoom(uint64_t bytes) {
+    while (bytes_ + bytes > memoryBytes_ && !loaded_.empty()) {
         bytes_ -= loaded_.back().texture.bytes();
         byMaterial_.erase(loaded_.back().material);
         loaded_.pop_back();
     }
-    return &loaded_.front().texture;
 }
 
 }  // namespace vcp

@@ -1,8 +1,7 @@
 // Texture: an image with a mip chain, sampled with filters; and the textures of a mesh's materials, in bounded memory.
 //
-// Texels are averaged as linear colours, each level from the one above by areas (any size, not only powers of two),
-// weighted by alpha, so that transparent texels lend no colour. Sampling is trilinear (Williams 1983); where a
-// footprint is longer than wide, at several places along it (McCormack et al. 1999, "Feline").
+// Texels are averaged as level_bands.h says. Sampling is trilinear (Williams 1983); where a footprint is longer than
+// wide, at several places along it (McCormack et al. 1999, "Feline").
 #pragma once
 
 #include <array>
@@ -46,16 +45,27 @@ public:
     Texture();
     explicit Texture(Image image, Wrap wrapU = Wrap::Repeat, Wrap wrapV = Wrap::Repeat);
 
+    /// The most texels that are kept: an image that has more is halved until it has no more. That is not for lack of
+    /// memory, so that colours do not depend on it.
+    static constexpr uint64_t kMostTexels = uint64_t{4096} * 4096;
+    /// Reads an image that was opened, row by row. Uses the calling arena's threads. Errors: as ImageRows::read().
+    static Result<Texture> read(ImageRows& image, Wrap wrapU = Wrap::Repeat, Wrap wrapV = Wrap::Repeat);
+    /// Returns the bytes() of what read() makes of an image of this size.
+    static uint64_t bytesOf(glm::uvec2 size);
+
     /// Returns the colour at `uv` ((0, 0): upper left corner, v downwards; finite), averaged over a footprint in the
     /// same units. Any thread.
     [[nodiscard]] Rgba8 sample(glm::vec2 uv, const TextureFootprint& footprint) const;
 
     [[nodiscard]] glm::uvec2 size() const { return {levels_[0].width, levels_[0].height}; }
     [[nodiscard]] uint64_t bytes() const;
-    /// The mip chain, the finest level first, down to a single texel.
+    /// The mip chain, the finest level that is kept first, down to a single texel.
     [[nodiscard]] std::span<const Image> levels() const { return levels_; }
 
 private:
+    Texture(std::vector<Image> levels, Wrap wrapU, Wrap wrapV)
+        : levels_(std::move(levels)), wrapU_(wrapU), wrapV_(wrapV) {}
+
     /// Light and alpha, each texel weighted by its alpha.
     [[nodiscard]] std::array<double, 4> trilinear(glm::dvec2 uv, double texels) const;
     [[nodiscard]] std::array<double, 4> bilinear(const Image& level, glm::dvec2 uv) const;
@@ -65,8 +75,8 @@ private:
     Wrap wrapV_;
 };
 
-/// The textures of a mesh, loaded when they are first asked for; those least recently used go when the memory limit is
-/// passed. One thread at a time.
+/// The textures of a mesh, loaded when they are first asked for; those least recently used go before another would pass
+/// the memory limit. One that passes it alone is the only one. One thread at a time.
 class TextureCache {
 public:
     explicit TextureCache(uint64_t memoryBytes, ImageLimits limits = {}) : memoryBytes_(memoryBytes), limits_(limits) {}
@@ -79,6 +89,9 @@ public:
     [[nodiscard]] uint64_t bytes() const { return bytes_; }
 
 private:
+    Result<Texture> load(const Material& material);
+    void makeRoom(uint64_t bytes);
+
     struct Loaded {
         uint32_t material;
         Texture texture;

@@ -257,15 +257,25 @@ TEST_F(ImageBuild, AToleranceHasNoPlaceForImages) {
     EXPECT_FALSE(readDataset(**openFile(output()))->hasImages());
 }
 
-// What nobody asks for is kept where there is room.
-TEST_F(ImageBuild, ImagesTooLargeForTheMemoryAreLeftOut) {
+// An image of many rows of tiles takes a few of them, however little memory there is; what has to be held as a whole is
+// kept where there is room, if nobody asks for it.
+TEST_F(ImageBuild, ImagesAreReadByRows) {
     BuildOptions o = options();
     o.keepImages.reset();
     const std::string whole = built(o);
     EXPECT_TRUE(whole == built(options()));
-    Image large{3400, 3400, {}};
+    Image large{4300, 4300, {}};
     large.texels.assign(size_t{large.width} * large.height, 0xff8090a0u);
-    std::ofstream(folder_ / "floor.png", std::ios::binary) << test::jpegOf(large);
+    for (uint32_t i = 0; i < large.height; ++i) large.texels[size_t{i} * large.width + i] = 0xff000000u + i;
+    const fs::path floor = folder_ / "floor.png";
+    std::ofstream(floor, std::ios::binary) << test::jpegOf(large);
+    o.memoryBytes = uint64_t{200} << 20;
+    const std::string little = built(o);
+    EXPECT_EQ(readDataset(**openFile(output()))->header.images.images, 2u);
+    o.memoryBytes = uint64_t{2} << 30;
+    EXPECT_TRUE(little == built(o));
+
+    std::ofstream(floor, std::ios::binary) << test::jpegOf(large, {.progressive = true, .sampling = {1, 1}});
     o.memoryBytes = uint64_t{200} << 20;
     const auto report = buildOctree(o);
     ASSERT_TRUE(report.ok()) << report.error().line();
@@ -279,6 +289,73 @@ TEST_F(ImageBuild, ImagesTooLargeForTheMemoryAreLeftOut) {
     EXPECT_EQ(refused.error().code, ErrorCode::Limit);
     o.memoryBytes = uint64_t{600} << 20;
     EXPECT_TRUE(buildOctree(o).ok());
+}
+
+// The bytes of an image lie in the file as they do where it is coded as a whole: coarse levels first, in Morton order.
+TEST_F(ImageBuild, TilesLieInTheirOrder) {
+    Image image{700, 1290, {}};
+    std::mt19937 random(4);
+    for (uint32_t i = 0; i < image.width * image.height; ++i)
+        image.texels.push_back(0xff000000u | Rgba8(random() % 7) << 8 | (i / 700 & 255));
+    const std::string jpeg = test::jpegOf(image, {.sampling = {1, 1}});
+    std::ofstream(folder_ / "floor.png", std::ios::binary) << jpeg;
+    ASSERT_FALSE(built(options()).empty());
+    const auto file = openFile(output());
+    const auto place = readDataset(**file)->header.images;
+    const auto tables = readImageTables(**file, place);
+    ASSERT_TRUE(tables.ok());
+    const auto levels = levelsOf(tables->images[0]);
+    const Texture whole(*decodeImage(jpeg));
+    uint64_t number = 0;
+    for (size_t l = levels.size(); l-- > 0;)
+        for (const glm::uvec2 tile : tileOrder(levels[l])) {
+            const glm::uvec2 size = levels[l].sizeOf(tile);
+            std::vector<uint32_t> expected, found(size_t{size.x} * size.y);
+            for (uint32_t y = 0; y < size.y; ++y)
+                for (uint32_t x = 0; x < size.x; ++x)
+                    expected.push_back(
+                        whole.levels()[l].texels[size_t{tile.y * 256 + y} * levels[l].width + tile.x * 256 + x]);
+            const auto stored = readTiles(**file, *tables, number, 1);
+            ASSERT_TRUE(stored.ok());
+            ASSERT_TRUE(decodeTile("", *tables, tables->images[0], *stored, number, size, found).ok());
+            // The finest level is the source's; those above it are JPEGs of 95.
+            for (size_t i = 0; i < found.size(); ++i)
+                for (int c = 0; c < 3; ++c)
+                    ASSERT_NEAR(int(found[i] >> 8 * c & 255u), int(expected[i] >> 8 * c & 255u), l == 0 ? 0 : 24)
+                        << "tile " << number;
+            ++number;
+        }
+}
+
+// What breaks off in its middle leaves no tile behind.
+TEST_F(ImageBuild, AnImageThatBreaksOffIsLeftOut) {
+    std::ofstream(folder_ / "floor.png") << "no picture";
+    const std::string without = built(options());
+    Image image{900, 1500, {}};
+    std::mt19937 random(4);
+    for (uint32_t i = 0; i < image.width * image.height; ++i) image.texels.push_back(0xff000000u | Rgba8(random()));
+    const std::string jpeg = test::jpegOf(image);
+    std::ofstream(folder_ / "floor.png", std::ios::binary) << jpeg.substr(0, 2 * jpeg.size() / 3);
+    const auto report = buildOctree(options());
+    ASSERT_TRUE(report.ok()) << report.error().line();
+    ASSERT_EQ(report->warnings.size(), 1u);
+    EXPECT_NE(report->warnings[0].find("floor.png: the JPEG picture is damaged"), std::string::npos);
+    EXPECT_TRUE(contentOf(output()) == without);
+}
+
+TEST_F(ImageBuild, MayBeCancelledWhileImagesAreRead) {
+    const std::string whole = built(options());
+    fs::remove(output());
+    BuildOptions o = options();
+    o.resume = true;
+    bool stop = true;
+    o.progress = [&](const BuildProgress& at) { return !(stop && at.stage == "images"); };
+    const auto stopped = buildOctree(o);
+    ASSERT_FALSE(stopped.ok());
+    EXPECT_EQ(stopped.error().code, ErrorCode::Cancelled);
+    EXPECT_FALSE(fs::exists(output()));
+    stop = false;
+    EXPECT_TRUE(built(o) == whole);
 }
 
 }  // namespace

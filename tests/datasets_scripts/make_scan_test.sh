@@ -32,6 +32,26 @@ faces=$(grep -c '^f ' dog.obj)
 [ "$faces" -gt 18000 ] && [ "$faces" -lt 22000 ] || fail "a dog of $faces triangles"
 [ "$(grep -c '^vt ' dog.obj)" -eq $((3 * faces)) ] || fail "a dog without all texture coordinates"
 
+# A scan with a picture: as many triangles, each with places inside the picture; the picture is as large as asked for.
+"$make_scan" --triangles 12000 --texture 300 -o textured.obj
+[ "$(grep -c '^f ' textured.obj)" -eq 12000 ] || fail "$(grep -c '^f ' textured.obj) faces with texture"
+[ "$(grep -c '^vt ' textured.obj)" -eq 36000 ] || fail "$(grep -c '^vt ' textured.obj) places"
+grep '^vt ' textured.obj | awk '$2 < 0 || $2 > 1 || $3 < 0 || $3 > 1 { exit 1 }' || fail "places beyond the picture"
+grep -q '^mtllib textured.mtl$' textured.obj && grep -q '^map_Kd textured.png$' textured.mtl || fail "textured.mtl"
+[ "$(od -An -tx1 -j16 -N8 textured.png | tr -d ' ')" = 0000012c0000012c ] || fail "a picture of another size"
+"$make_scan" --triangles 12000 --texture 300 --jpeg -o textured.obj
+"$make_scan" --triangles 12000 --texture 300 --jpeg -o textured.obj || fail "a JPEG is not replaced by a JPEG"
+[ "$(od -An -tx1 -N2 textured.jpg | tr -d ' ')" = ffd8 ] || fail "textured.jpg is no JPEG"
+grep -q '^map_Kd textured.jpg$' textured.mtl || fail "textured.mtl does not name the JPEG"
+echo "a user's own" >mine.jpg
+refuses 1 "mine.jpg: is there" --texture 300 --jpeg -o mine.obj
+refuses 2 "must end in .obj" --texture 300 -o x.ply
+refuses 2 "without --colour" --texture 300 --utm -o x.obj
+refuses 2 "a pipe" --texture 300 -o -
+refuses 2 "wants --texture" --jpeg -o x.obj
+refuses 2 "256 to 32768" --texture 40000 -o x.obj
+refuses 2 "of the statue" --shape dog --texture 300 -o x.obj
+
 refuses 2 "statue or dog" --shape cat -o x.obj
 refuses 2 "of the statue" --shape dog --seed 3 -o x.obj
 refuses 2 "at most 200000" --shape dog --triangles 1M -o x.obj

@@ -4,16 +4,21 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdio>
 #include <cstring>
 #include <limits>
 #include <map>
 #include <set>
+#include <sstream>
 
 #include <gtest/gtest.h>
+#include <png.h>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
 #include "datasets_scripts/dog.h"
 #include "datasets_scripts/procedural_noise.h"
+#include "datasets_scripts/test_picture.h"
 
 namespace vcp::scan {
 namespace {
@@ -51,6 +56,77 @@ Mesh parse(const ScanMesh& mesh, const std::vector<std::byte>& bytes) {
     }
     EXPECT_EQ(at, bytes.data() + bytes.size());
     return parsed;
+}
+
+TEST(ScanMesh, AnObjIsTheSameMeshWithPlacesInItsCharts) {
+    const ScanMesh mesh({.triangles = 20'000, .seed = 3});
+    const Mesh ply = parse(mesh, bytesOf(mesh));
+    std::string text;
+    const auto written = mesh.writeObj(
+        [&](std::span<const std::byte> piece) -> Result<void> {
+            text.append(reinterpret_cast<const char*>(piece.data()), piece.size());
+            return {};
+        },
+        "its.mtl");
+    ASSERT_TRUE(written.ok());
+    EXPECT_NE(text.find("mtllib its.mtl\nusemtl scan\n"), std::string::npos);
+    std::vector<glm::dvec2> places;
+    size_t vertices = 0, triangles = 0;
+    double widest = 0;
+    std::istringstream lines(text);
+    for (std::string line; std::getline(lines, line);) {
+        glm::dvec3 p;
+        glm::dvec2 uv;
+        std::array<unsigned, 3> v, t;
+        if (std::sscanf(line.c_str(), "v %lf %lf %lf", &p.x, &p.y, &p.z) == 3) {
+            ASSERT_LT(glm::distance(p, ply.positions[vertices++]), 2e-6);
+        } else if (std::sscanf(line.c_str(), "vt %lf %lf", &uv.x, &uv.y) == 2) {
+            places.push_back(uv);
+        } else if (std::sscanf(line.c_str(), "f %u/%u %u/%u %u/%u", &v[0], &t[0], &v[1], &t[1], &v[2], &t[2]) == 6) {
+            for (size_t i = 0; i < 3; ++i) {
+                ASSERT_EQ(v[i] - 1, ply.triangles[triangles][i]);
+                ASSERT_LE(t[i], places.size());
+                const glm::dvec2 side = glm::abs(places[t[i] - 1] - places[t[(i + 1) % 3] - 1]);
+                widest = std::max(widest, side.x);
+            }
+            ++triangles;
+        }
+    }
+    EXPECT_EQ(vertices, ply.positions.size());
+    EXPECT_EQ(triangles, 20'000u);
+    // A triangle across a part's seam would be as wide as its chart, and those are a tenth of the picture.
+    EXPECT_LT(widest, 0.05);
+}
+
+TEST(TestPicture, HasItsTexels) {
+    std::string file;
+    const auto written = writeTestPicture(300, PictureKind::Png, [&](std::span<const std::byte> bytes) -> Result<void> {
+        file.append(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+        return {};
+    });
+    ASSERT_TRUE(written.ok());
+    png_image png{};
+    png.version = PNG_IMAGE_VERSION;
+    ASSERT_TRUE(png_image_begin_read_from_memory(&png, file.data(), file.size()));
+    ASSERT_EQ(png.width, 300u);
+    ASSERT_EQ(png.height, 300u);
+    png.format = PNG_FORMAT_RGB;
+    std::vector<uint8_t> bytes(size_t{3} * 300 * 300);
+    ASSERT_TRUE(png_image_finish_read(&png, nullptr, bytes.data(), 0, nullptr));
+    for (uint32_t i = 0; i < 300 * 300; ++i)
+        for (uint32_t c = 0; c < 3; ++c) ASSERT_EQ(bytes[3 * i + c], testTexel(i % 300, i / 300)[c]) << i;
+    // The digit of the second cell's column is a 1, and not a 7.
+    const auto isRed = [](uint32_t x, uint32_t y) { return testTexel(x, y) == std::array<uint8_t, 3>{200, 30, 20}; };
+    const uint32_t left = 128 + 16 + 2 * 32;
+    EXPECT_FALSE(isRed(left + 4, 12));
+    EXPECT_TRUE(isRed(left + 12, 12));
+    EXPECT_FALSE(isRed(left + 20, 12));
+    for (const PictureKind kind : {PictureKind::Png, PictureKind::Jpeg}) {
+        const auto full = writeTestPicture(300, kind, [&](std::span<const std::byte>) -> Result<void> {
+            return Error{.code = ErrorCode::Io, .message = "full"};
+        });
+        EXPECT_FALSE(full.ok());
+    }
 }
 
 TEST(ScanMesh, CountsAreExact) {

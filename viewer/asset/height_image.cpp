@@ -12,6 +12,7 @@
 #include <fmt/format.h>
 #include <png.h>
 
+#include "builder/stream/random_bytes.h"
 #include "builder/texture/png_chunks.h"
 #include "octree/io/regular_file.h"
 #include "viewer/asset/exr_picture.h"
@@ -89,7 +90,7 @@ Result<meso::HeightMap> exrHeights(std::span<const std::byte> file, double range
 /// Decodes a PNG, which may be hostile. Errors, without file: as checkPng(), InvalidInput (damaged), Limit (above
 /// `kMaxGridEdge`).
 Result<meso::HeightMap> pngHeights(std::string_view file, double range) {
-    VCP_TRY_ASSIGN(const auto chunks, checkPng(file));
+    VCP_TRY_ASSIGN(const auto chunks, checkPng(*randomBytesAt(file)));
     const uint32_t width = chunks.width, height = chunks.height;
     if (width > uint32_t(meso::kMaxGridEdge) || height > uint32_t(meso::kMaxGridEdge))
         return Error{.code = ErrorCode::Limit,

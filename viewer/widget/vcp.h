@@ -456,7 +456,8 @@ VCP_API vcp_status vcp_view_stats(vcp_view* view, vcp_stats* stats);
 
 typedef struct vcp_progress {
     uint32_t struct_size;
-    const char* stage; /* "reading", "sorting", "level 1 of 6", "writing", "done"; lives until the callback returns */
+    const char* stage; /* "reading", "images", "sorting", "level 1 of 6", "writing", "done"; lives until the callback
+                          returns */
     double fraction;   /* fraction of the whole, 0 to 1, never less than before; 1: done */
     uint64_t triangles;
     double seconds;

@@ -7,6 +7,7 @@
 
 #include <gtest/gtest.h>
 
+#include "builder/texture/image.h"
 #include "octree/image/jpeg_tile.h"
 #include "tests/support/jpeg_files.h"
 
@@ -31,6 +32,27 @@ Image picture(uint32_t width, uint32_t height) {
     return image;
 }
 
+/// A picture that is decoded, and its blocks, one row of tiles after the other.
+struct RowsOfTiles {
+    std::string file;
+    std::unique_ptr<ImageRows> rows;
+    std::vector<Rgba8> texels;  ///< of the row of tiles that was read last
+    uint32_t done = 0;          ///< rows of texels
+
+    explicit RowsOfTiles(std::string bytes) : file(std::move(bytes)) {
+        auto opened = ImageRows::open(randomBytesAt(file));
+        if (opened) rows = *std::move(opened);
+    }
+    /// Reads the next row of tiles. Returns its blocks; null where there are none, or it cannot be read.
+    const JpegBlocks* next() {
+        if (!rows) return nullptr;
+        const uint32_t count = std::min(kLargeTileEdge, rows->size().y - done);
+        done += count;
+        texels.resize(size_t{count} * rows->size().x);
+        return rows->read(texels) ? rows->blocks() : nullptr;
+    }
+};
+
 class JpegBlocksOf : public ::testing::TestWithParam<JpegKind> {
 protected:
     /// Cuts a picture of that size into tiles, and compares what they decode to.
@@ -40,12 +62,18 @@ protected:
         const std::string file = jpegOf(picture(width, height), kind);
         const auto whole = decodeImage(file);
         ASSERT_TRUE(whole.ok());
-        const auto blocks = JpegBlocks::read(file);
-        ASSERT_NE(blocks, nullptr);
+        RowsOfTiles rows(file);
+        const JpegBlocks* blocks = nullptr;
         const ImageLevel level{width, height, 0, kLargeTileEdge};
         size_t bytes = 0;
-        for (const glm::uvec2 place : tileOrder(level)) {
-            const glm::uvec2 size = level.sizeOf(place);
+        for (uint32_t i = 0; i < level.tiles(); ++i) {
+            const glm::uvec2 place(i % level.tilesX(), i / level.tilesX()), size = level.sizeOf(place);
+            if (place.x == 0) {
+                blocks = rows.next();
+                ASSERT_NE(blocks, nullptr) << place.y;
+                EXPECT_TRUE(std::equal(rows.texels.begin(), rows.texels.end(),
+                                       whole->texels.begin() + size_t{place.y} * kLargeTileEdge * width));
+            }
             const auto tile = blocks->tile(level, place);
             EXPECT_EQ(tile.empty(), size.x <= 4 && width > 4) << "few columns are decoded in another way";
             if (tile.empty()) continue;
@@ -76,6 +104,7 @@ TEST_P(JpegBlocksOf, ShowWhatThePictureShows) {
     compare(300, 531);
     compare(260, 300);
     compare(261, 257);
+    compare(40, 1300);
     compare(3, 70);
 }
 
@@ -88,19 +117,42 @@ INSTANTIATE_TEST_SUITE_P(All, JpegBlocksOf,
 
 TEST(JpegBlocks, KnowTheirQuality) {
     for (const int quality : {1, 30, 50, 75, 90, 95, 100})
-        EXPECT_EQ(JpegBlocks::read(jpegOf(picture(20, 20), {.quality = quality}))->quality(), quality);
+        EXPECT_EQ(RowsOfTiles(jpegOf(picture(20, 20), {.quality = quality})).next()->quality(), quality);
 }
 
 TEST(JpegBlocks, AreNoneOfWhatCannotBeCut) {
     const std::string file = jpegOf(picture(300, 200));
-    EXPECT_NE(JpegBlocks::read(file), nullptr);
-    EXPECT_EQ(JpegBlocks::read("\x89PNG"), nullptr);
-    EXPECT_EQ(JpegBlocks::read(""), nullptr);
+    const auto haveBlocks = [](const std::string& bytes) { return RowsOfTiles(bytes).next() != nullptr; };
+    EXPECT_TRUE(haveBlocks(file));
+    EXPECT_FALSE(haveBlocks("\x89PNG"));
+    EXPECT_FALSE(haveBlocks(""));
     for (size_t bytes = 0; bytes < file.size(); bytes += 37)
-        EXPECT_EQ(JpegBlocks::read(file.substr(0, bytes)), nullptr) << "cut off after " << bytes;
-    EXPECT_EQ(JpegBlocks::read(jpegOf(picture(40, 40), {.sampling = {3, 1}})), nullptr) << "blocks of 24 texels";
-    EXPECT_EQ(JpegBlocks::read(jpegOf(picture(40, 40), {.colours = JCS_RGB})), nullptr);
-    EXPECT_EQ(JpegBlocks::read(jpegOf(picture(40, 40), {.scans = {kMeansOnly}})), nullptr) << "it lacks bits";
+        EXPECT_FALSE(haveBlocks(file.substr(0, bytes))) << "cut off after " << bytes;
+    EXPECT_FALSE(haveBlocks(jpegOf(picture(40, 40), {.sampling = {3, 1}}))) << "blocks of 24 texels";
+    EXPECT_FALSE(haveBlocks(jpegOf(picture(40, 40), {.colours = JCS_RGB})));
+    EXPECT_FALSE(haveBlocks(jpegOf(picture(40, 40), {.scans = {kMeansOnly}}))) << "it lacks bits";
+}
+
+// Whatever its height, a picture of one scan keeps a row of tiles and what its decoder is ahead.
+TEST(JpegBlocks, KeepARowOfTiles) {
+    for (const bool isProgressive : {false, true}) {
+        SCOPED_TRACE(isProgressive);
+        const JpegKind kind{.progressive = isProgressive, .sampling = {1, 1}};
+        RowsOfTiles low(jpegOf(picture(64, 600), kind)), high(jpegOf(picture(64, 1800), kind));
+        ASSERT_TRUE(low.rows && high.rows);
+        EXPECT_EQ(low.rows->heldBytes() == high.rows->heldBytes(), !isProgressive);
+        EXPECT_GE(low.rows->heldBytes(), 6u * 64 * 256);
+        if (!isProgressive) {
+            EXPECT_LT(low.rows->heldBytes(), 6u * 72 * 280);
+        }
+        const ImageLevel level{64, 1800, 0, kLargeTileEdge};
+        ASSERT_NE(high.next(), nullptr);
+        const JpegBlocks* const blocks = high.next();
+        ASSERT_NE(blocks, nullptr);
+        EXPECT_FALSE(blocks->tile(level, {0, 1}).empty());
+        EXPECT_EQ(blocks->tile(level, {0, 0}).empty(), !isProgressive) << "it went";
+        EXPECT_EQ(blocks->tile(level, {0, 3}).empty(), !isProgressive) << "it has not come";
+    }
 }
 
 // A file's tiles are what JpegBlocks and packJpeg() write, and nothing else.
