@@ -4,7 +4,9 @@
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <unordered_map>
 
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
 #include "octree/page/page_triangles.h"
@@ -87,6 +89,17 @@ private:
     std::vector<bool> has_;
 };
 
+// Images of so many blocks across are needed in parts: of what is near, more is needed than of the rest of a page.
+constexpr uint32_t kLargeBlocks = 8;
+
+/// Returns a number of the triangles that are needed together: those in one of 4 x 4 x 4 parts of a page that show so
+/// many texels, to a power of two.
+uint64_t partOf(glm::vec3 middle, uint32_t log2Cells, float texels) {
+    const glm::uvec3 part(glm::clamp(middle * std::ldexp(4.0f, -int(log2Cells)), 0.0f, 3.0f));
+    const int octave = std::clamp(std::ilogb(std::max(texels, 1e-3f)), -8, 23) + 8;
+    return uint64_t(octave) << 6 | part.z << 4 | part.y << 2 | part.x;
+}
+
 struct Texels {
     int64_t first, last;
 };
@@ -116,23 +129,27 @@ void forEachTile(Texels texels, int64_t size, uint32_t edge, const Visit& visit)
 std::vector<ImageNeed> imageNeeds(const ImageTables& tables, const PageView& page) {
     std::vector<ImageNeed> needs;
     if (page.points.empty()) return needs;
-    std::vector<int64_t> placeOf;  // in `needs`, by image
-    std::vector<Blocks> blocks;    // of each of `needs`
+    std::unordered_map<uint64_t, size_t> placeOf;  // in `needs`
+    std::vector<Blocks> blocks;                    // of each of `needs`
     forEachTriangle(page, [&](const Index3& corners) {
         const uint32_t number = page.points[corners[0]].material;
         if (number == 0 || number > tables.materials.size()) return;
         const MaterialRow& material = tables.materials[number - 1];
         const ImageRow& image = tables.images[material.image];
-        if (placeOf.size() <= material.image) placeOf.resize(tables.images.size(), -1);
+        const auto p = cornersOf(page, corners);
+        const glm::vec3 low = glm::min(p[0], glm::min(p[1], p[2])), high = glm::max(p[0], glm::max(p[1], p[2]));
         const float texels = texelsPerCell(page, corners, glm::vec2(float(image.width), float(image.height)));
-        if (placeOf[material.image] < 0) {
-            placeOf[material.image] = int64_t(needs.size());
-            needs.push_back({material.image, texels, {}});
+        const bool isLarge = blocksAcross(image) >= kLargeBlocks;
+        const uint64_t part = isLarge ? partOf(0.5f * (low + high), page.header.log2Cells, texels) : 0;
+        const auto [found, isNew] = placeOf.try_emplace(uint64_t{material.image} << 32 | part, needs.size());
+        if (isNew) {
+            needs.push_back({material.image, texels, {}, low, high});
             blocks.emplace_back(image);
         }
-        const auto at = size_t(placeOf[material.image]);
-        needs[at].texelsPerCell = std::min(needs[at].texelsPerCell, texels);
-        blocks[at].add(page.points[corners[0]], page.points[corners[1]], page.points[corners[2]], material);
+        ImageNeed& need = needs[found->second];
+        need.texelsPerCell = std::min(need.texelsPerCell, texels);
+        need.low = glm::min(need.low, low), need.high = glm::max(need.high, high);
+        blocks[found->second].add(page.points[corners[0]], page.points[corners[1]], page.points[corners[2]], material);
     });
     for (size_t i = 0; i < needs.size(); ++i) needs[i].blocks = blocks[i].all();
     return needs;

@@ -10,8 +10,8 @@
 
 namespace vcp {
 
-/// Returns what a checked page needs, each image once; nothing where it has no points. Materials that there are not
-/// count for none.
+/// Returns what a checked page needs; nothing where it has no points. Of a large image there are several needs: of
+/// triangles that are near each other and show it about as finely. Materials that there are not count for none.
 std::vector<ImageNeed> imageNeeds(const ImageTables& tables, const PageView& page);
 
 /// Returns the finest level that a need asks for where pixels are so wide, cells of the page: no footprint of a pixel

@@ -47,7 +47,12 @@ double shownError(const Dataset& dataset, const PageEntry& page, const Selection
 }
 
 bool inFrustum(const Dataset& dataset, const PageEntry& page, const SelectionView& view) {
-    const glm::dvec3 lo = dataset.originOf(page) - view.eye, hi = lo + dataset.edgeOf(page);
+    const glm::dvec3 low = dataset.originOf(page);
+    return inFrustum(low, low + dataset.edgeOf(page), view);
+}
+
+bool inFrustum(glm::dvec3 low, glm::dvec3 high, const SelectionView& view) {
+    const glm::dvec3 lo = low - view.eye, hi = high - view.eye;
     for (const glm::dvec4& plane : view.planes) {
         const glm::dvec3 normal(plane);
         const glm::dvec3 farthest(normal.x > 0 ? hi.x : lo.x, normal.y > 0 ? hi.y : lo.y, normal.z > 0 ? hi.z : lo.z);

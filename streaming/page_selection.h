@@ -136,5 +136,7 @@ double shownError(const Dataset& dataset, const PageEntry& page, const Selection
 
 /// Whether a page's box touches the view's frustum (no false negatives).
 bool inFrustum(const Dataset& dataset, const PageEntry& page, const SelectionView& view);
+/// The same of any box in the world.
+bool inFrustum(glm::dvec3 low, glm::dvec3 high, const SelectionView& view);
 
 }  // namespace vcp

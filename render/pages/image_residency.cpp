@@ -18,12 +18,10 @@ constexpr int kUrgentLevels = 6;
 /// How many levels of an image are read at once.
 constexpr uint32_t kLevelsAhead = 3;
 
-/// Returns the edge of a pixel at the point of a page's box nearest to the eye, in the page's cells.
-double pixelEdgeAt(const Dataset& dataset, const PageEntry& page, const SelectionView& view) {
-    const double edge = 1 / (view.pixelsPerUnit * dataset.cellOf(page.level));
-    if (view.orthographic) return edge;
-    const glm::dvec3 lo = dataset.originOf(page), hi = lo + dataset.edgeOf(page);
-    return edge * glm::length(glm::clamp(view.eye, lo, hi) - view.eye);
+/// Returns the edge of a pixel at the point of a box nearest to the eye.
+double pixelEdgeAt(glm::dvec3 low, glm::dvec3 high, const SelectionView& view) {
+    const double edge = 1 / view.pixelsPerUnit;
+    return view.orthographic ? edge : edge * glm::length(glm::clamp(view.eye, low, high) - view.eye);
 }
 
 }  // namespace
@@ -41,7 +39,7 @@ ImageResidency::ImageResidency(std::shared_ptr<const ImagePieces> pieces, uint64
 }
 
 ImageResidency::Shown ImageResidency::shownOf(const ImageNeed& need) const {
-    Shown shown{need.image, need.texelsPerCell, {}, {}};
+    Shown shown{need.image, need.texelsPerCell, need.low, need.high, {}, {}};
     for (uint32_t level = 0; level <= pieces().firstLevel(need.image); ++level) {
         const auto added = piecesNeeded(pieces(), need, level);
         shown.begin.push_back(uint32_t(shown.pieces.size()));
@@ -65,9 +63,13 @@ void ImageResidency::look(const Dataset& dataset, const SelectionView& view, con
     for (const uint64_t page : cut) {
         const auto shown = pages_.find(page);
         if (shown == pages_.end() || !inFrustum(dataset, dataset.pages[page], view)) continue;
-        const double edge = pixelEdgeAt(dataset, dataset.pages[page], view);
+        const glm::dvec3 origin = dataset.originOf(dataset.pages[page]);
+        const double cell = dataset.cellOf(dataset.pages[page].level);
         for (const Shown& of : shown->second) {
-            const uint32_t finest = finestNeeded(of.texelsPerCell, edge, uint32_t(pieces().levelsOf(of.image).size()));
+            const glm::dvec3 low = origin + cell * glm::dvec3(of.low), high = origin + cell * glm::dvec3(of.high);
+            if (!inFrustum(low, high, view)) continue;
+            const uint32_t finest = finestNeeded(of.texelsPerCell, pixelEdgeAt(low, high, view) / cell,
+                                                 uint32_t(pieces().levelsOf(of.image).size()));
             const uint32_t begin = of.begin[std::min(size_t{finest}, of.begin.size() - 1)];
             for (size_t i = begin; i < of.pieces.size(); ++i) look.needed[of.pieces[i]] = true;
         }

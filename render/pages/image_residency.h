@@ -57,10 +57,11 @@ public:
     [[nodiscard]] uint64_t mostBytes() const { return mostBytes_; }
 
 private:
-    /// What a page shows of an image.
+    /// What a part of a page shows of an image.
     struct Shown {
         uint32_t image = 0;
         float texelsPerCell = 0;
+        glm::vec3 low{0}, high{0};     // the part's box, cells of the page
         std::vector<uint32_t> pieces;  // of all levels, the finest first
         std::vector<uint32_t> begin;   // of each level among them, up to that of the first piece
     };

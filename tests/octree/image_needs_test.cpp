@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include <gtest/gtest.h>
 
@@ -70,11 +71,12 @@ TEST_F(ImageNeeds, AreAllThatFootprintsRead) {
         const auto places = points(page, 1 + seed % 3, number(-2, 3), std::exp2(number(-7, 0.5)), random);
         page.points = places;
         const auto needs = imageNeeds(pieces_->tables(), page);
-        ASSERT_EQ(needs.size(), 1u);
+        ASSERT_GE(needs.size(), 1u);
         const uint32_t image = needs[0].image, finest = seed % 5;
         std::vector<bool> has(pieces_->count());
         for (uint32_t level = finest; level < pieces_->levelsOf(image).size(); ++level)
-            for (const uint32_t piece : piecesNeeded(*pieces_, needs[0], level)) has[piece] = true;
+            for (const ImageNeed& need : needs)
+                for (const uint32_t piece : piecesNeeded(*pieces_, need, level)) has[piece] = true;
         left += uint64_t(std::count(has.begin(), has.end(), false));
         const ImageSet some = setOf(has);
         forEachTriangle(page, [&](const Index3& corners) {
@@ -127,16 +129,44 @@ TEST_F(ImageNeeds, OfASmallPartAreSmall) {
     PageView page = whole.view();
     const auto places = points(page, 1, 0.3, 0.001, random);
     page.points = places;
-    const auto needs = imageNeeds(pieces_->tables(), page);
-    ASSERT_EQ(needs.size(), 1u);
     // 1900 texels are 16 blocks across, of which four may meet there.
     EXPECT_EQ(blocksAcross(pieces_->tables().images[0]), 16u);
-    EXPECT_LE(needs[0].blocks.size(), 4u);
-    EXPECT_LE(piecesNeeded(*pieces_, needs[0], 0).size(), 2u);
+    for (const ImageNeed& need : imageNeeds(pieces_->tables(), page)) {
+        EXPECT_LE(need.blocks.size(), 4u);
+        EXPECT_LE(piecesNeeded(*pieces_, need, 0).size(), 2u);
+    }
     // Twice around is all of it.
     const auto around = points(page, 1, 0, 1.2, random);
     page.points = around;
-    EXPECT_EQ(imageNeeds(pieces_->tables(), page)[0].blocks.size(), 256u);
+    std::set<uint16_t> all;
+    for (const ImageNeed& need : imageNeeds(pieces_->tables(), page))
+        all.insert(need.blocks.begin(), need.blocks.end());
+    EXPECT_EQ(all.size(), 256u);
+}
+
+TEST_F(ImageNeeds, EachTriangleIsInOneAsWideAndAsFine) {
+    const test::WholePage whole = test::sheet(3, 3, 3, 12).build(1);
+    std::mt19937 random(2);
+    PageView page = whole.view();
+    const auto places = points(page, 1, 0.5, 0.3, random);
+    page.points = places;
+    const auto needs = imageNeeds(pieces_->tables(), page);
+    EXPECT_GT(needs.size(), 4u);
+    forEachTriangle(page, [&](const Index3& corners) {
+        const auto p = cornersOf(page, corners);
+        const auto isWithin = [&](const ImageNeed& need) {
+            for (const glm::vec3& corner : p)
+                if (glm::any(glm::lessThan(corner, need.low)) || glm::any(glm::greaterThan(corner, need.high)))
+                    return false;
+            for (const uint32_t corner : corners) {
+                const TexturePoint& at = page.points[corner];
+                const auto block = uint16_t(int(at.v / kUnit * 16) * 16 + int(at.u / kUnit * 16));
+                if (!std::binary_search(need.blocks.begin(), need.blocks.end(), block)) return false;
+            }
+            return true;
+        };
+        EXPECT_TRUE(std::any_of(needs.begin(), needs.end(), isWithin));
+    });
 }
 
 }  // namespace

@@ -42,7 +42,7 @@ protected:
     /// What a page needs that shows all of an image.
     [[nodiscard]] ImageNeed need(uint32_t image, float texelsPerCell) const {
         const uint32_t across = blocksAcross(pieces_->tables().images[image]);
-        ImageNeed need{image, texelsPerCell, {}};
+        ImageNeed need{image, texelsPerCell, {}, glm::vec3(0), glm::vec3(64)};
         for (uint32_t block = 0; block < across * across; ++block) need.blocks.push_back(uint16_t(block));
         return need;
     }
@@ -177,7 +177,7 @@ TEST_F(ImageResidencyTest, WhatIsNotInViewAnyMoreIsNotRead) {
 
 TEST_F(ImageResidencyTest, OnlyThePartsThatAreSeenAreRead) {
     // A piece is half of the image across; the other levels are read as a whole.
-    const auto corner = [&](uint16_t block) { return ImageNeed{0, 0.0f, {block}}; };
+    const auto corner = [&](uint16_t block) { return ImageNeed{0, 0.0f, {block}, glm::vec3(0), glm::vec3(64)}; };
     ImageResidency images(pieces_, 4 * (2 * 512 * 512 + 512 * 512 * 4 / 3));
     const auto isThere = [&](uint32_t column, uint32_t row) {
         return images.shown()->images()[0].levels[0].tileOf(column, row) != nullptr;
@@ -198,6 +198,25 @@ TEST_F(ImageResidencyTest, OnlyThePartsThatAreSeenAreRead) {
     EXPECT_EQ(settle(images), 1u);
     EXPECT_TRUE(isThere(1023, 1023) && isThere(1023, 0) && !isThere(0, 0));
     EXPECT_FALSE(images.isLimited());
+}
+
+TEST_F(ImageResidencyTest, APartOfAPageIsSeenByItself) {
+    // Both show all of the image. One is far behind the other, and the third is not in view.
+    ImageResidency images(pieces_, kAll);
+    ImageNeed near = need(0, 8.0f), far = need(1, 8.0f), beside = need(2, 8.0f);
+    near.high.z = 1;
+    far.low.z = 62;
+    beside.low.x = 50;
+    images.learn(0, {near, far, beside});
+    SelectionView view = pixelsOf(2.01);
+    const Dataset& dataset = made_.dataset;
+    const double edge = dataset.originOf(dataset.pages[0]).x + 40 * dataset.cellOf(0) - view.eye.x;
+    view.planes[0] = {-1, 0, 0, edge};
+    look(images, view);
+    settle(images);
+    // A pixel is two cells wide in front, and nearly four behind.
+    EXPECT_EQ(finest(images), (std::vector<uint32_t>{3, 3, 9}));
+    EXPECT_TRUE(images.isComplete());
 }
 
 TEST_F(ImageResidencyTest, EveryViewHasWhatItNeeds) {
