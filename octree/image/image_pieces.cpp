@@ -64,9 +64,9 @@ ImagePiece ImagePieces::piece(uint64_t number) const {
     return piece;
 }
 
-/// Returns the size of tile `i` of a piece. The first piece of an image has a level a tile, the coarsest first.
 glm::uvec2 ImagePieces::sizeOf(const ImagePiece& piece, uint64_t i) const {
     const std::vector<ImageLevel>& levels = levels_[piece.image];
+    // The first piece of an image has a level a tile, the coarsest first.
     const bool isFirst = piece.level == firstLevel_[piece.image];
     const ImageLevel& level = isFirst ? levels[levels.size() - 1 - i] : levels[piece.level];
     return level.sizeOf(placeOf(piece.firstTile + i));

@@ -41,6 +41,8 @@ public:
     [[nodiscard]] uint32_t firstLevel(uint32_t image) const { return firstLevel_[image]; }
     /// Column and row of a tile in its level.
     [[nodiscard]] glm::uvec2 placeOf(uint64_t tile) const { return {places_[tile].x, places_[tile].y}; }
+    /// Returns the size of tile `i` of a piece, texels.
+    [[nodiscard]] glm::uvec2 sizeOf(const ImagePiece& piece, uint64_t i) const;
     /// Returns the texels of its tiles.
     [[nodiscard]] uint64_t texelsOf(const ImagePiece& piece) const;
     /// Where a piece is in the file; pieces follow each other.
@@ -55,8 +57,6 @@ public:
     Result<std::vector<uint32_t>> readPiece(const ByteReader& reader, uint64_t number) const;
 
 private:
-    [[nodiscard]] glm::uvec2 sizeOf(const ImagePiece& piece, uint64_t i) const;
-
     struct Place {
         uint16_t x, y;
     };

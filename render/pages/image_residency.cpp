@@ -49,17 +49,23 @@ void ImageResidency::look(const Dataset& dataset, const SelectionView& view, con
                           ViewNumber number) {
     Look& look = looks_[number];
     if (look.view == view && look.cut == cut && !look.finest.empty()) return;
-    look = {view, cut, nothing()};
-    for (const uint64_t page : cut) {
+    look = {view, cut, finestOn(dataset, view, cut)};
+    replan();
+}
+
+std::vector<uint32_t> ImageResidency::finestOn(const Dataset& dataset, const SelectionView& view,
+                                               const std::vector<uint64_t>& pages) const {
+    std::vector<uint32_t> all = nothing();
+    for (const uint64_t page : pages) {
         const auto needs = needs_.find(page);
         if (needs == needs_.end() || !inFrustum(dataset, dataset.pages[page], view)) continue;
         const double edge = pixelEdgeAt(dataset, dataset.pages[page], view);
         for (const ImageNeed& need : needs->second) {
-            uint32_t& finest = look.finest[need.image];
+            uint32_t& finest = all[need.image];
             finest = std::min(finest, finestNeeded(need.texelsPerCell, edge, images()[need.image].levels));
         }
     }
-    replan();
+    return all;
 }
 
 void ImageResidency::forgetView(ViewNumber number) {

@@ -34,6 +34,9 @@ public:
     /// Says which pages a view draws. Precondition: needs of those that have any were learnt.
     void look(const Dataset& dataset, const SelectionView& view, const std::vector<uint64_t>& cut,
               ViewNumber number = 0);
+    /// Returns, for each image, the number of the finest level that a view needs on some of its pages; of levels: none.
+    [[nodiscard]] std::vector<uint32_t> finestOn(const Dataset& dataset, const SelectionView& view,
+                                                 const std::vector<uint64_t>& pages) const;
     /// The view does not show the dataset any more.
     void forgetView(ViewNumber number);
     /// Takes in the texels of a piece that was wished for.

@@ -3,6 +3,8 @@ import { decompress } from './fzstd.js';
 
 const kText = new TextEncoder();
 const kRecordBytes = 104; // of a CutRecord (wasm/page_copies.h)
+const kLevelBytes = 16; // of a LevelRecord (wasm/image_copies.h)
+const kMostLevels = 32; // of an image
 
 /// What WASI's library asks of a system. There is a clock and nothing else.
 function system(memory) {
@@ -26,6 +28,12 @@ function system(memory) {
         },
         { get: (functions, name) => functions[name] ?? refused },
     );
+}
+
+/// Returns which image and which of its levels a key below 0 names.
+function imageLevel(key) {
+    const number = -1 - key;
+    return [Math.floor(number / kMostLevels), number % kMostLevels];
 }
 
 export class Module {
@@ -172,17 +180,37 @@ export class Module {
         this.wasm.vcp_end_sample(asksRays, listens);
     }
 
-    /// Returns the pages that `count` rows of the picture from `first` on need: `records` for beginCopied(), and of each
-    /// page its number and where its bytes are.
+    /// Returns the pages and levels of images that `count` rows of the picture from `first` on need: `records` and
+    /// `levels` for beginCopied(), and of each its key and where its bytes are.
     needed(first, count) {
-        const pages = this.wasm.vcp_needed(first, count), at = this.wasm.vcp_records();
-        const records = new Uint8Array(this.wasm.memory.buffer, at, kRecordBytes * pages).slice();
-        const view = new DataView(records.buffer);
+        const pages = this.wasm.vcp_needed(first, count);
+        const records = this.copyOf(this.wasm.vcp_records(), kRecordBytes * pages), view = new DataView(records.buffer);
         const list = Array.from({ length: pages }, (_, i) => ({
-            number: Number(view.getBigUint64(kRecordBytes * i, true)), bytes: view.getUint32(kRecordBytes * i + 92, true),
+            key: Number(view.getBigUint64(kRecordBytes * i, true)), bytes: view.getUint32(kRecordBytes * i + 92, true),
             address: view.getUint32(kRecordBytes * i + 96, true),
         }));
-        return { records, list };
+        const levels = this.copyOf(this.wasm.vcp_levels(), kLevelBytes * this.wasm.vcp_levels_count());
+        const numbers = new Uint32Array(levels.buffer);
+        for (let i = 0; i < numbers.length; i += 4) {
+            const [image, level, bytes, address] = numbers.subarray(i, i + 4);
+            list.push({ key: -1 - (kMostLevels * image + level), bytes, address });
+        }
+        return { records, levels, list };
+    }
+    /// Returns what an instance without pages must know of the images, once levels of them are needed.
+    imageTables() {
+        return this.copyOf(this.wasm.vcp_tables(), this.wasm.vcp_tables_bytes());
+    }
+    /// Returns the JPEGs for the browser to decode, each once.
+    jpegs() {
+        return Array.from({ length: this.wasm.vcp_jpegs() }, (_, i) => {
+            const [id, width, height, bytes, address] = new Uint32Array(this.wasm.memory.buffer, this.wasm.vcp_jpeg(i), 5);
+            return { id, width, height, bytes: this.copyOf(address, bytes) };
+        });
+    }
+    /// Takes in the texels of a JPEG, RGBA8; null: it cannot be decoded.
+    putJpeg(id, texels) {
+        this.with(texels ?? new Uint8Array(), at => this.wasm.vcp_put_jpeg(id, at, (texels?.byteLength ?? 0) / 4));
     }
     /// Returns a copy of bytes of the module's memory.
     copyOf(address, bytes) {
@@ -196,17 +224,24 @@ export class Module {
     follow(lead) {
         this.with(lead, at => this.wasm.vcp_follow(at));
     }
-    takePage(number, bytes) {
-        const at = this.wasm.vcp_room(number, bytes.length);
+    /// Begins with images there.
+    followImages(tables) {
+        this.with(tables, at => this.wasm.vcp_follow_images(at));
+    }
+    /// Takes the copy of a page or of a level of an image, by its key.
+    take(key, bytes) {
+        const [image, level] = imageLevel(key);
+        const at = key >= 0 ? this.wasm.vcp_room(key, bytes.length) : this.wasm.vcp_level_room(image, level);
         new Uint8Array(this.wasm.memory.buffer, at, bytes.length).set(bytes);
     }
-    dropPage(number) {
-        this.wasm.vcp_drop(number);
+    drop(key) {
+        if (key >= 0) this.wasm.vcp_drop(key);
+        else this.wasm.vcp_level_drop(...imageLevel(key));
     }
-    /// Begins a sample that another instance began, with pages that were taken.
-    beginCopied(records, sample, { errorPixels, asksRays, listens }) {
-        return this.with(records, at => this.begun(this.wasm.vcp_begin_copied(
-            at, records.length / kRecordBytes, sample, errorPixels, asksRays, listens)));
+    /// Begins a sample that another instance began, with pages and levels that were taken.
+    beginCopied({ records, levels }, sample, { errorPixels, asksRays, listens }) {
+        return this.with(records, pages => this.with(levels, at => this.begun(this.wasm.vcp_begin_copied(
+            pages, records.length / kRecordBytes, at, levels.length / kLevelBytes, sample, errorPixels, asksRays, listens))));
     }
 
     pick(x, y) {

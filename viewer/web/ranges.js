@@ -27,6 +27,12 @@ export function joined(stretches, gap, most) {
     return runs;
 }
 
+/// Orders runs by which holds the first of some stretches, which are ordered.
+export function urgentFirst(runs, stretches) {
+    const first = new Map(runs.map(run => [run, stretches.findIndex(({ offset }) => offset >= run.offset && offset < run.offset + run.bytes)]));
+    return [...runs].sort((a, b) => first.get(a) - first.get(b));
+}
+
 /// Returns what of stretches is in none of others.
 export function without(stretches, others) {
     return others.reduce((left, other) => left.flatMap(({ offset, bytes }) => {
