@@ -8,7 +8,7 @@ import path from 'node:path';
 import { pathToFileURL } from 'node:url';
 import zlib from 'node:zlib';
 import { Browser } from './browser.mjs';
-import { compareDepth, readDepth } from './native_depth.mjs';
+import { compareDepth, readDepth } from './native_picture.mjs';
 
 const [vcp, folder, pictures] = process.argv.slice(2);
 // Read as a module whatever the nearest package.json says.
@@ -399,24 +399,26 @@ async function serves() {
     server.kill('SIGINT');
 }
 
+/// Runs a step and says how long it took.
+async function step(run, ...all) {
+    const began = performance.now();
+    await run(...all);
+    console.log(`   ${[run.name, ...all].join(' ')}: ${((performance.now() - began) / 1e3).toFixed(1)} s`);
+}
+
 if (scan.length > 512 << 10) {
     // Of the larger scans, whose pages outnumber a small budget.
-    await leaves();
-    await wanders();
+    await step(leaves);
+    await step(wanders);
 } else {
-    await hears();
-    await looks(1600, 1000, false);
-    await looks(390, 844, true);
-    await complains();
-    await lights();
+    await step(hears);
+    await step(looks, 1600, 1000, false);
+    await step(looks, 390, 844, true);
+    await step(complains);
+    await step(lights);
     if (scan.length > kLead) {
-        for (const name of Object.keys(kCameras)) await measures(name, 320, 200);
-        await shares();
-        await moves();
-        await annotates();
-        await returns();
-        await crosses();
-        await serves();
+        for (const name of Object.keys(kCameras)) await step(measures, name, 320, 200);
+        for (const run of [shares, moves, annotates, returns, crosses, serves]) await step(run);
     }
 }
 await browser.close();
