@@ -27,9 +27,13 @@ export function joined(stretches, gap, most) {
     return runs;
 }
 
+export function overlap(a, b) {
+    return a.offset < b.offset + b.bytes && b.offset < a.offset + a.bytes;
+}
+
 /// Orders runs by which holds the first of some stretches, which are ordered.
 export function urgentFirst(runs, stretches) {
-    const first = new Map(runs.map(run => [run, stretches.findIndex(({ offset }) => offset >= run.offset && offset < run.offset + run.bytes)]));
+    const first = new Map(runs.map(run => [run, stretches.findIndex(one => overlap(one, run))]));
     return [...runs].sort((a, b) => first.get(a) - first.get(b));
 }
 

@@ -1,7 +1,7 @@
 // The first worker of a viewer: fetches, decodes, chooses pages and draws, with others where there are any (share.js), so
 // that the page never waits.
 import { Module } from './module.js';
-import { Ranges, joined, urgentFirst, without } from './ranges.js';
+import { Ranges, joined, overlap, urgentFirst, without } from './ranges.js';
 import { Caster, costsOf, partsOf } from './share.js';
 
 const kLead = 64 << 10;      // bytes of the first request: header, directory and the coarsest pages
@@ -43,24 +43,31 @@ async function open({ url, wasm, budgetBytes }) {
 /// Fetches what the module misses, the most urgent first; the loop goes on when it has come.
 function fetchMissing() {
     const underWay = [...asked], missing = without(module.missing(), underWay);
-    // What is joined may have something between that is under way, or was fetched before.
-    const there = [...underWay, ...without(fetched, missing)];
     let bytesAsked = underWay.reduce((sum, run) => sum + run.bytes, 0);
-    for (const run of urgentFirst(without(joined(missing, kGap, kMostBytes), there), missing)) {
-        if (asked.size >= kAtOnce || bytesAsked >= kBytesAtOnce) break;
-        asked.add(run);
-        bytesAsked += run.bytes;
-        ranges.read(run.offset, run.bytes)
-            .then(bytes => {
-                module.supply(run.offset, bytes);
-                fetched = joined([...fetched, run], 0, Infinity);
-            })
-            .catch(error => { failed = error; })
-            .finally(() => {
-                asked.delete(run);
-                wake();
-            });
+    for (const run of urgentFirst(joined(missing, kGap, kMostBytes), missing)) {
+        // What is joined may have something between that is under way, or was fetched before.
+        const there = [...underWay, ...without(fetched.filter(one => overlap(one, run)), missing)];
+        for (const part of without([run], there)) {
+            const [wanted] = joined(missing.filter(one => overlap(one, part)), Infinity, Infinity);
+            if (asked.size >= kAtOnce || bytesAsked >= kBytesAtOnce) return;
+            if (!wanted) continue;
+            bytesAsked += wanted.bytes;
+            fetchPart(wanted);
+        }
     }
+}
+function fetchPart(part) {
+    asked.add(part);
+    ranges.read(part.offset, part.bytes)
+        .then(bytes => {
+            module.supply(part.offset, bytes);
+            fetched = joined([...fetched, part], 0, Infinity);
+        })
+        .catch(error => { failed = error; })
+        .finally(() => {
+            asked.delete(part);
+            wake();
+        });
 }
 
 /// Decodes JPEGs that the module has no decoder for; the loop goes on when their texels are there.
