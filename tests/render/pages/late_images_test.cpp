@@ -24,8 +24,10 @@ protected:
         request_.width = request_.height = 200;
     }
 
-    [[nodiscard]] std::vector<PlacedResidency> opened(DatasetImages images) const {
-        auto opened = openResidencies(hostPageMemory(), {.hiddenToo = true}, {walls_}, std::move(images));
+    static std::vector<PlacedResidency> opened(const PlacedDataset& walls, DatasetImages images = {}) {
+        RendererOptions options;
+        options.hiddenToo = true;
+        auto opened = openResidencies(hostPageMemory(), options, {walls}, std::move(images));
         EXPECT_TRUE(opened);
         return *std::move(opened);
     }
@@ -55,12 +57,12 @@ protected:
 
 TEST_F(LateImagesTest, PagesThatWereThereShowThem) {
     const DatasetImages images = *findImages({&walls_, 1}, true, 64 << 20);
-    auto early = opened(images);
+    auto early = opened(walls_, images);
     settle(early);
     // A source that was not asked for images does not say what pages need of them.
     PlacedDataset other = walls_;
     other.source = std::make_shared<FilePageSource>(*openFile(walls_.source->name()), walls_.dataset);
-    auto late = *openResidencies(hostPageMemory(), {.hiddenToo = true}, {other});
+    auto late = opened(other);
     settle(late);
     Residency& residency = *late[0].residency;
     EXPECT_EQ(residency.images(), nullptr);
@@ -75,7 +77,7 @@ TEST_F(LateImagesTest, PagesThatWereThereShowThem) {
 }
 
 TEST_F(LateImagesTest, APartOfTheViewReadsWhatItsPagesShow) {
-    auto images = opened(*findImages({&walls_, 1}, true, 64 << 20));
+    auto images = opened(walls_, *findImages({&walls_, 1}, true, 64 << 20));
     settle(images);
     Residency& residency = *images[0].residency;
     const SelectionView view = selectionView(request_);

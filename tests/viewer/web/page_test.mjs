@@ -183,7 +183,8 @@ async function shares() {
 /// What the program sees from an orbit's camera. Returns depths, and the path of the picture.
 function nativeView(name, orbit, width, height, more = [], file = 'scan.vcp') {
     const path_ = end => path.join(pictures, `${name}.${end}`);
-    fs.writeFileSync(path_('json'), JSON.stringify({ position: orbit.eye(), target: orbit.target, fov_degrees: kFieldOfView * 180 / Math.PI }));
+    const camera = { position: orbit.eye(), target: orbit.target, fov_degrees: kFieldOfView * 180 / Math.PI };
+    fs.writeFileSync(path_('json'), JSON.stringify(camera));
     execFileSync(vcp, ['render', path.join(folder, file), '--device', 'host', '--camera', path_('json'), '--size', `${width}x${height}`,
         '--depth', path_('pfm'), '-o', path_('png'), '--overwrite', '--progress', 'none', ...more]);
     return { depth: readDepth(path_('pfm'), width, height), picture: path_('png') };
