@@ -495,7 +495,7 @@ if (kind === 'images') {
     await step(leaves);
     await step(wanders);
 } else {
-    await step(hears);
+    if (scan.length <= kLead) await step(hears); // whatever the scan
     await step(looks, 1600, 1000, false);
     await step(looks, 390, 844, true);
     await step(complains);
