@@ -6,8 +6,10 @@
 namespace vcp {
 
 SceneSource::SceneSource(std::vector<Part> parts) : parts_(std::move(parts)), limits_(parts_.size()) {
+    // There are no more pieces than tiles, whose rows stand in the section: so their tables need not be known yet.
     for (const Part& part : parts_)
-        numbers_.add(part.dataset->pages.size(), part.dataset->pages.blocks(), part.images ? part.images->count() : 0);
+        numbers_.add(part.dataset->pages.size(), part.dataset->pages.blocks(),
+                     part.dataset->header.images.bytes / sizeof(TileRow));
 }
 
 Result<PageBytes> SceneSource::read(Request request, bool withColour) const {

@@ -59,8 +59,14 @@ void ImageResidency::look(const Dataset& dataset, const SelectionView& view, con
                           ViewNumber number) {
     Look& look = looks_[number];
     if (look.view == view && look.cut == cut && !look.needed.empty()) return;
-    look = {view, cut, std::vector<bool>(pieces().count())};
-    for (const uint64_t page : cut) {
+    look = {view, cut, neededOn(dataset, view, cut)};
+    replan();
+}
+
+std::vector<bool> ImageResidency::neededOn(const Dataset& dataset, const SelectionView& view,
+                                           const std::vector<uint64_t>& pages) const {
+    std::vector<bool> needed(pieces().count());
+    for (const uint64_t page : pages) {
         const auto shown = pages_.find(page);
         if (shown == pages_.end() || !inFrustum(dataset, dataset.pages[page], view)) continue;
         const glm::dvec3 origin = dataset.originOf(dataset.pages[page]);
@@ -71,10 +77,10 @@ void ImageResidency::look(const Dataset& dataset, const SelectionView& view, con
             const uint32_t finest = finestNeeded(of.texelsPerCell, pixelEdgeAt(low, high, view) / cell,
                                                  uint32_t(pieces().levelsOf(of.image).size()));
             const uint32_t begin = of.begin[std::min(size_t{finest}, of.begin.size() - 1)];
-            for (size_t i = begin; i < of.pieces.size(); ++i) look.needed[of.pieces[i]] = true;
+            for (size_t i = begin; i < of.pieces.size(); ++i) needed[of.pieces[i]] = true;
         }
     }
-    replan();
+    return needed;
 }
 
 void ImageResidency::forgetView(ViewNumber number) {

@@ -35,6 +35,9 @@ public:
     /// Says which pages a view draws. Precondition: needs of those that have any were learnt.
     void look(const Dataset& dataset, const SelectionView& view, const std::vector<uint64_t>& cut,
               ViewNumber number = 0);
+    /// Returns which pieces a view needs on some of its pages.
+    [[nodiscard]] std::vector<bool> neededOn(const Dataset& dataset, const SelectionView& view,
+                                             const std::vector<uint64_t>& pages) const;
     /// The view does not show the dataset any more.
     void forgetView(ViewNumber number);
     /// Takes in the texels of a piece that was wished for.
@@ -53,6 +56,7 @@ public:
     [[nodiscard]] bool isComplete(ViewNumber number = 0) const;
     /// Whether the view needs more than is allowed.
     [[nodiscard]] bool isLimited(ViewNumber number = 0) const;
+    [[nodiscard]] const ImagePieces& pieces() const { return assembly_.pieces(); }
     /// The most bytes that images take.
     [[nodiscard]] uint64_t mostBytes() const { return mostBytes_; }
 
@@ -70,7 +74,6 @@ private:
         std::vector<uint64_t> cut;
         std::vector<bool> needed;  // pieces
     };
-    [[nodiscard]] const ImagePieces& pieces() const { return assembly_.pieces(); }
     [[nodiscard]] Shown shownOf(const ImageNeed& need) const;
     void replan();
     void plan();

@@ -73,6 +73,12 @@ public:
     /// The levels of the file's images to draw from, the same until the scene's next update; null: the colours of
     /// vertices are shown.
     [[nodiscard]] std::shared_ptr<const ImageSet> images() const { return images_ ? images_->shown() : nullptr; }
+    /// The pieces of the images that the view needs on some of its pages. Precondition: images() is not null.
+    [[nodiscard]] std::vector<bool> neededOn(const SelectionView& view, const std::vector<uint64_t>& pages) const {
+        return images_->neededOn(dataset(), view, pages);
+    }
+    /// Precondition: images() is not null.
+    [[nodiscard]] const ImagePieces& pieces() const { return images_->pieces(); }
     /// Counts the sets of levels.
     [[nodiscard]] uint64_t imagesVersion() const { return images_ ? images_->version() : 0; }
     /// The most bytes that these take.
@@ -103,7 +109,7 @@ private:
     SceneResidency& scene_;
     const size_t number_;
     const PooledDataset dataset_;
-    const std::unique_ptr<ImageResidency> images_;
+    std::unique_ptr<ImageResidency> images_;
     std::map<ViewNumber, ViewCut> cuts_;
     uint64_t cutsDrawn_ = 0;  // number of the last cut
 };

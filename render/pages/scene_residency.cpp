@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "octree/image_needs.h"
 #include "streaming/steady_seconds.h"
 
 namespace vcp {
@@ -109,6 +110,25 @@ Result<void> SceneResidency::setBudgets(const PageMemorySource& memory, uint64_t
         page.bytes = {};
     }
     return pool_->flush();
+}
+
+Result<void> SceneResidency::showImages(size_t dataset, std::shared_ptr<const ImagePieces> images, uint64_t mostBytes) {
+    Residency& shown = datasets_[dataset];
+    auto residency = std::make_unique<ImageResidency>(images, mostBytes);
+    startLoader();  // what the old loader held was read without its needs
+    std::vector<uint4> bytes;
+    for (const uint64_t page : shown.residentPages()) {
+        const PageEntry& entry = shown.dataset().pages[page];
+        const uint64_t colour = shown.hasColour() ? entry.colourBytes : 0;
+        if (colour == 0) continue;
+        bytes.resize((entry.pageBytes + colour) / sizeof(uint4));
+        const auto all = std::as_writable_bytes(std::span(bytes));
+        VCP_TRY(pool_->read(shown.slotOf(page), 0, all));
+        const PageView view = viewOfChecked(all.first(entry.pageBytes), all.subspan(entry.pageBytes, colour));
+        residency->learn(page, imageNeeds(images->tables(), view));
+    }
+    shown.images_ = std::move(residency);
+    return {};
 }
 
 void SceneResidency::releasePool() {

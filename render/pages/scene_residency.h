@@ -57,6 +57,11 @@ public:
     void releasePool();
     Result<void> rebuild(const PageMemorySource& memory);
 
+    /// Begins to show a dataset's images, which are its source's, within so many bytes; until then the colours of
+    /// vertices are shown. What pages need that are in the pool is found from their bytes. Ends reads that are under
+    /// way. Errors: Device.
+    Result<void> showImages(size_t dataset, std::shared_ptr<const ImagePieces> images, uint64_t mostBytes);
+
     struct Update {
         UpdateResult all;               ///< what holds for all datasets; Residency::cutOf says what is drawn of each
         std::vector<DrawableCut> cuts;  ///< for each dataset

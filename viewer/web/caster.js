@@ -1,14 +1,15 @@
-// A worker that casts bands of pictures for the first worker (worker.js), from copies of the pages that they need.
+// A worker that casts bands of pictures for the first worker (worker.js), from copies of what they need.
 import { Module } from './module.js';
 
 let module;
 
 /// Does a job of the first worker's (share.js).
-function cast({ view, sample, begun, records, pages, dropped, first, count, shows }) {
-    for (const number of dropped) module.dropPage(number);
-    for (const { number, bytes } of pages) module.takePage(number, bytes);
+function cast({ view, sample, begun, needed, tables, copies, dropped, first, count, shows }) {
+    if (tables) module.followImages(tables);
+    for (const key of dropped) module.drop(key);
+    for (const { key, bytes } of copies) module.take(key, bytes);
     module.look(view);
-    const { rows } = module.beginCopied(records, sample, begun);
+    const { rows } = module.beginCopied(needed, sample, begun);
     return { ...module.castBands(view, rows, first, count, shows), said: module.said() };
 }
 

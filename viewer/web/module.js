@@ -3,6 +3,7 @@ import { decompress } from './fzstd.js';
 
 const kText = new TextEncoder();
 const kRecordBytes = 104; // of a CutRecord (wasm/page_copies.h)
+const kTileBytes = 16; // of a TileRecord (wasm/image_copies.h)
 
 /// What WASI's library asks of a system. There is a clock and nothing else.
 function system(memory) {
@@ -172,17 +173,37 @@ export class Module {
         this.wasm.vcp_end_sample(asksRays, listens);
     }
 
-    /// Returns the pages that `count` rows of the picture from `first` on need: `records` for beginCopied(), and of each
-    /// page its number and where its bytes are.
+    /// Returns the pages and tiles of images that `count` rows of the picture from `first` on need: `records` and `tiles`
+    /// for beginCopied(), and of each its key and where its bytes are. Keys of tiles are below 0.
     needed(first, count) {
-        const pages = this.wasm.vcp_needed(first, count), at = this.wasm.vcp_records();
-        const records = new Uint8Array(this.wasm.memory.buffer, at, kRecordBytes * pages).slice();
-        const view = new DataView(records.buffer);
+        const pages = this.wasm.vcp_needed(first, count);
+        const records = this.copyOf(this.wasm.vcp_records(), kRecordBytes * pages), view = new DataView(records.buffer);
         const list = Array.from({ length: pages }, (_, i) => ({
-            number: Number(view.getBigUint64(kRecordBytes * i, true)), bytes: view.getUint32(kRecordBytes * i + 92, true),
+            key: Number(view.getBigUint64(kRecordBytes * i, true)), bytes: view.getUint32(kRecordBytes * i + 92, true),
             address: view.getUint32(kRecordBytes * i + 96, true),
         }));
-        return { records, list };
+        const tiles = this.copyOf(this.wasm.vcp_tiles(), kTileBytes * this.wasm.vcp_tiles_count());
+        const numbers = new Uint32Array(tiles.buffer);
+        for (let i = 0; i < numbers.length; i += 4) {
+            const [number, bytes, address] = numbers.subarray(i, i + 3);
+            list.push({ key: -1 - number, bytes, address });
+        }
+        return { records, tiles, list };
+    }
+    /// Returns what an instance without pages must know of the images, once tiles of them are needed.
+    imageTables() {
+        return this.copyOf(this.wasm.vcp_tables(), this.wasm.vcp_tables_bytes());
+    }
+    /// Returns the JPEGs for the browser to decode, each once.
+    jpegs() {
+        return Array.from({ length: this.wasm.vcp_jpegs() }, (_, i) => {
+            const [id, width, height, bytes, address] = new Uint32Array(this.wasm.memory.buffer, this.wasm.vcp_jpeg(i), 5);
+            return { id, width, height, bytes: this.copyOf(address, bytes) };
+        });
+    }
+    /// Takes in the texels of a JPEG, RGBA8; null: it cannot be decoded.
+    putJpeg(id, texels) {
+        this.with(texels ?? new Uint8Array(), at => this.wasm.vcp_put_jpeg(id, at, (texels?.byteLength ?? 0) / 4));
     }
     /// Returns a copy of bytes of the module's memory.
     copyOf(address, bytes) {
@@ -196,17 +217,23 @@ export class Module {
     follow(lead) {
         this.with(lead, at => this.wasm.vcp_follow(at));
     }
-    takePage(number, bytes) {
-        const at = this.wasm.vcp_room(number, bytes.length);
+    /// Begins with images there.
+    followImages(tables) {
+        this.with(tables, at => this.wasm.vcp_follow_images(at));
+    }
+    /// Takes the copy of a page or of a tile of an image, by its key.
+    take(key, bytes) {
+        const at = key >= 0 ? this.wasm.vcp_room(key, bytes.length) : this.wasm.vcp_tile_room(-1 - key);
         new Uint8Array(this.wasm.memory.buffer, at, bytes.length).set(bytes);
     }
-    dropPage(number) {
-        this.wasm.vcp_drop(number);
+    drop(key) {
+        if (key >= 0) this.wasm.vcp_drop(key);
+        else this.wasm.vcp_tile_drop(-1 - key);
     }
-    /// Begins a sample that another instance began, with pages that were taken.
-    beginCopied(records, sample, { errorPixels, asksRays, listens }) {
-        return this.with(records, at => this.begun(this.wasm.vcp_begin_copied(
-            at, records.length / kRecordBytes, sample, errorPixels, asksRays, listens)));
+    /// Begins a sample that another instance began, with pages and tiles that were taken.
+    beginCopied({ records, tiles }, sample, { errorPixels, asksRays, listens }) {
+        return this.with(records, pages => this.with(tiles, at => this.begun(this.wasm.vcp_begin_copied(
+            pages, records.length / kRecordBytes, at, tiles.length / kTileBytes, sample, errorPixels, asksRays, listens))));
     }
 
     pick(x, y) {

@@ -27,6 +27,16 @@ export function joined(stretches, gap, most) {
     return runs;
 }
 
+export function overlap(a, b) {
+    return a.offset < b.offset + b.bytes && b.offset < a.offset + a.bytes;
+}
+
+/// Orders runs by which holds the first of some stretches, which are ordered.
+export function urgentFirst(runs, stretches) {
+    const first = new Map(runs.map(run => [run, stretches.findIndex(one => overlap(one, run))]));
+    return [...runs].sort((a, b) => first.get(a) - first.get(b));
+}
+
 /// Returns what of stretches is in none of others.
 export function without(stretches, others) {
     return others.reduce((left, other) => left.flatMap(({ offset, bytes }) => {

@@ -1,18 +1,19 @@
 // The first worker of a viewer: fetches, decodes, chooses pages and draws, with others where there are any (share.js), so
 // that the page never waits.
 import { Module } from './module.js';
-import { Ranges, joined, without } from './ranges.js';
+import { Ranges, joined, overlap, urgentFirst, without } from './ranges.js';
 import { Caster, costsOf, partsOf } from './share.js';
 
 const kLead = 64 << 10;      // bytes of the first request: header, directory and the coarsest pages
-const kGap = 32 << 10;       // pages so near each other are fetched in one request
+const kGap = 32 << 10;       // pages, and pieces of images, so near each other are fetched in one request
 const kMostBytes = 256 << 10; // of one request
-const kAtOnce = 4;           // requests
+const kAtOnce = 12, kBytesAtOnce = 1 << 20; // requests, and bytes that they ask for
 const kFrameMs = 16; // between frames that nothing else asks for
 const kSamples = 8;          // of a pixel, where a view is at rest
 
-let module, ranges, view = null, awake = null, failed = null, drawn = null, hidden = false;
+let module, ranges, view = null, awake = null, failed = null, drawn = null, hidden = false, decoding = 0;
 const asked = new Set(); // stretches under way
+let fetched = []; // stretches that came
 const casters = []; // the other workers
 let plan = null; // which bands of the picture are whose
 let costs = []; // milliseconds of each band of the last picture
@@ -39,21 +40,55 @@ async function open({ url, wasm, budgetBytes }) {
     post('opened', { info: module.info() });
 }
 
-/// Fetches what the module misses; the loop goes on when it has come.
+/// Fetches what the module misses, the most urgent first; the loop goes on when it has come.
 function fetchMissing() {
-    const underWay = [...asked];
-    // What is joined may have something between that is under way.
-    for (const run of without(joined(without(module.missing(), underWay), kGap, kMostBytes), underWay)) {
-        if (asked.size >= kAtOnce) break;
-        asked.add(run);
-        ranges.read(run.offset, run.bytes)
-            .then(bytes => module.supply(run.offset, bytes))
-            .catch(error => { failed = error; })
-            .finally(() => {
-                asked.delete(run);
-                wake();
-            });
+    const underWay = [...asked], missing = without(module.missing(), underWay);
+    let bytesAsked = underWay.reduce((sum, run) => sum + run.bytes, 0);
+    for (const run of urgentFirst(joined(missing, kGap, kMostBytes), missing)) {
+        // What is joined may have something between that is under way, or was fetched before.
+        const there = [...underWay, ...without(fetched.filter(one => overlap(one, run)), missing)];
+        for (const part of without([run], there)) {
+            const [wanted] = joined(missing.filter(one => overlap(one, part)), Infinity, Infinity);
+            if (asked.size >= kAtOnce || bytesAsked >= kBytesAtOnce) return;
+            if (!wanted) continue;
+            bytesAsked += wanted.bytes;
+            fetchPart(wanted);
+        }
     }
+}
+function fetchPart(part) {
+    asked.add(part);
+    ranges.read(part.offset, part.bytes)
+        .then(bytes => {
+            module.supply(part.offset, bytes);
+            fetched = joined([...fetched, part], 0, Infinity);
+        })
+        .catch(error => { failed = error; })
+        .finally(() => {
+            asked.delete(part);
+            wake();
+        });
+}
+
+/// Decodes JPEGs that the module has no decoder for; the loop goes on when their texels are there.
+function decodeJpegs() {
+    for (const jpeg of module.jpegs()) {
+        ++decoding;
+        texelsOf(jpeg).catch(() => null).then(texels => {
+            --decoding;
+            module.putJpeg(jpeg.id, texels);
+        }).catch(error => { failed = error; }).finally(wake);
+    }
+}
+
+/// Returns the texels of a JPEG, RGBA8, as they are stored: no colour is matched to the screen's.
+async function texelsOf({ bytes, width, height }) {
+    const image = await createImageBitmap(new Blob([bytes], { type: 'image/jpeg' }), { colorSpaceConversion: 'none' });
+    if (image.width !== width || image.height !== height) throw new Error('it has another size');
+    const context = new OffscreenCanvas(width, height).getContext('2d', { willReadFrequently: true });
+    context.drawImage(image, 0, 0);
+    image.close();
+    return context.getImageData(0, 0, width, height).data;
 }
 
 function wake() {
@@ -147,6 +182,7 @@ async function run() {
         module.look(now);
         const update = module.update();
         fetchMissing();
+        decodeJpegs();
         if (update.problem) post('problem', { message: update.problem });
         const isNew = drawn?.view !== now || update.changed || update.awaitsRays;
         if (update.drawable && isNew) {
@@ -159,7 +195,7 @@ async function run() {
             await new Promise(done => {
                 awake = done;
                 // The policy may need more frames before it lets pages go that were seen a moment ago.
-                if (!update.settled && asked.size === 0) setTimeout(done, kFrameMs);
+                if (!update.settled && asked.size + decoding === 0) setTimeout(done, kFrameMs);
             });
         }
         // Messages of the page come in between.

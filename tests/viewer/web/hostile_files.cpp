@@ -90,7 +90,19 @@ void change(std::span<std::byte> bytes, size_t first, std::mt19937_64& random) {
     }
 }
 
-/// Changes header, entries or stored pages.
+/// Returns the bytes of an input's tables of images; none where they are not there.
+std::span<std::byte> tablesIn(std::span<std::byte> input) {
+    std::span<const std::byte> rest(input);
+    const ImagesPlace place = fuzz::take<FileHeader>(rest).images;
+    const uint64_t entries = fuzz::take<uint16_t>(rest), first = blockOffset(blocksOf(entries));
+    const uint64_t before = input.size() - rest.size() + entries * sizeof(PageEntry);
+    if (place.offset < first || before > input.size() || place.offset - first >= input.size() - before) return {};
+    constexpr size_t kMostBytes = 4096;
+    const auto section = input.subspan(before + place.offset - first);
+    return section.first(std::min({section.size(), size_t(place.bytes), kMostBytes}));
+}
+
+/// Changes header, entries, stored pages or images.
 void changeStored(Bytes& input, std::mt19937_64& random) {
     const size_t entries = sizeof(FileHeader) + 2;
     if (input.size() <= entries) return;  // it was cut off there
@@ -105,14 +117,30 @@ void changeStored(Bytes& input, std::mt19937_64& random) {
         case 3:
             change(std::span(input).first(std::min(input.size(), entries + 400)), entries, random);
             break;
+        case 4:
+            if (const auto tables = tablesIn(input); !tables.empty()) change(tables, 0, random);
+            break;
         default:
             change(input, entries, random);
     }
 }
 
+/// Moves the section of images in a file to another place: its tiles say where they are.
+void moveImages(std::span<std::byte> section, ImagesPlace& place, uint64_t offset) {
+    size_t at = place.images * sizeof(ImageRow) + place.materials * sizeof(MaterialRow);
+    for (uint64_t end = section.size(); at + sizeof(TileRow) <= end; at += sizeof(TileRow)) {
+        TileRow row;
+        std::memcpy(&row, &section[at], sizeof row);
+        end = std::min(end, row.offset - place.offset);
+        row.offset += offset - place.offset;
+        std::memcpy(&section[at], &row, sizeof row);
+    }
+    place.offset = offset;
+}
+
 /// Changes pages as they are when decoded, so that what lies behind the decoder is met; lays the pages out anew.
 Bytes changePages(std::span<const std::byte> input, std::mt19937_64& random) {
-    const auto header = fuzz::take<FileHeader>(input);
+    auto header = fuzz::take<FileHeader>(input);
     std::vector<PageEntry> entries(fuzz::take<uint16_t>(input));
     for (PageEntry& entry : entries) entry = fuzz::take<PageEntry>(input);
     const uint64_t first = blockOffset(blocksOf(entries.size()));
@@ -137,6 +165,13 @@ Bytes changePages(std::span<const std::byte> input, std::mt19937_64& random) {
         entry.pageBytes = uint32_t(packed.geometryBytes);
         if (entry.colourStoredBytes > 0)
             entry.colourOffset = place(input.subspan(colour - first, entry.colourStoredBytes));
+    }
+    if ((header.flags & kFlagImages) != 0) {
+        const auto images = input.subspan(header.images.offset - first, header.images.bytes);
+        Bytes section{images.begin(), images.end()};
+        const uint64_t end = first + pages.size();
+        moveImages(section, header.images, (end + kPageAlignment - 1) / kPageAlignment * kPageAlignment);
+        place(section);
     }
     return inputOf(header, entries, pages);
 }

@@ -4,82 +4,14 @@
 // VIEW.json: a camera; VIEW.pfm: the depth that the program sees from there, 320 x 200.
 import assert from 'node:assert/strict';
 import fs from 'node:fs';
-import path from 'node:path';
-import { pathToFileURL } from 'node:url';
-import { compareDepth, readDepth } from './native_depth.mjs';
+import {
+    CasterHere, Module, Orbit, Ranges, cast, check, checks, costsOf, hitsOf, joined, kFieldOfView, look, movingScale, opened, parseContentRange,
+    partsOf, quick, server, settle, supply, urgentFirst, wasm, without,
+} from './module_use.mjs';
+import { compareDepth, readDepth } from './native_picture.mjs';
 
-const [web, scan, hostile, ...natives] = process.argv.slice(2);
-const { Module } = await import(pathToFileURL(path.join(web, 'module.js')));
-const { Ranges, joined, parseContentRange, without } = await import(pathToFileURL(path.join(web, 'ranges.js')));
-const { Caster, costsOf, partsOf } = await import(pathToFileURL(path.join(web, 'share.js')));
-const { Orbit, kFieldOfView, movingScale } = await import(pathToFileURL(path.join(web, 'camera.js')));
-const wasm = fs.readFileSync(path.join(web, 'vcp.wasm'));
+const [, scan, hostile, ...natives] = process.argv.slice(2);
 const file = fs.readFileSync(scan);
-
-let checks = 0;
-async function check(name, run) {
-    await run();
-    ++checks;
-    console.log(`ok ${name}`);
-}
-
-/// A server of one file in memory. `change(answer)`: what it does wrong.
-function server(bytes, change = answer => answer) {
-    return async (url, { headers }) => {
-        const [first, last] = /bytes=(\d+)-(\d+)/.exec(headers.Range).slice(1).map(Number);
-        const part = bytes.subarray(first, Math.min(last + 1, bytes.length));
-        return change(new Response(part, {
-            status: 206, headers: { 'Content-Range': `bytes ${first}-${first + part.length - 1}/${bytes.length}` },
-        }));
-    };
-}
-const quick = ranges => Object.assign(ranges, { delay: 1 });
-
-async function supply(module, ranges) {
-    for (const { offset, bytes } of joined(module.missing(), 32 << 10, 256 << 10))
-        module.supply(offset, await ranges.read(offset, bytes));
-}
-
-async function opened(ranges, budget = 64 << 20) {
-    const module = await Module.load(wasm);
-    const lead = await ranges.read(0, 64 << 10);
-    module.begin(ranges.size, 'scan.vcp', budget);
-    module.supply(0, lead);
-    while (!module.open()) await supply(module, ranges);
-    return module;
-}
-
-function look(module, orbit, width = 320, height = 200, errorPixels = 0.5) {
-    const { up, forward } = orbit.axes();
-    module.look({ eye: orbit.eye(), forward, up, fov: kFieldOfView, width, height, errorPixels });
-}
-
-/// Casts a sample of the picture in its bands; returns its depth.
-function cast(module, sample = 0, width = 320, height = 200) {
-    const begun = module.beginSample(sample), depth = new Float32Array(width * height);
-    for (let band = 0; band < begun.bands; ++band) {
-        module.castBands({ width, height }, begun.rows, band, 1, false);
-        const row = band * begun.rows;
-        depth.set(module.depth(width * Math.min(begun.rows, height - row)), width * row);
-    }
-    if (sample === 0) module.endSample(begun);
-    return depth;
-}
-
-/// Goes on until nothing is missing, as the worker does; returns the last update.
-async function settle(module, ranges, budget) {
-    for (let round = 0; round < 1000; ++round) {
-        const update = module.update();
-        assert.equal(update.problem, null);
-        assert.ok(update.residentBytes <= budget, 'the budget holds');
-        if (update.drawable && update.awaitsRays) cast(module);
-        if (update.settled) return update;
-        await supply(module, ranges);
-    }
-    assert.fail('it does not settle');
-}
-
-const hitsOf = depth => depth.reduce((sum, x) => sum + (Number.isFinite(x) ? 1 : 0), 0);
 
 await check('content ranges', () => {
     assert.deepEqual(parseContentRange('bytes 0-9/20'), { first: 0, last: 9, size: 20 });
@@ -94,6 +26,7 @@ await check('stretches are joined', () => {
     assert.deepEqual(without(far, [{ offset: 5, bytes: 100 }]), [{ offset: 105, bytes: 5 }, { offset: 0, bytes: 5 }]);
     assert.deepEqual(without(far, []), far);
     assert.deepEqual(without([{ offset: 0, bytes: 10 }], [{ offset: 2, bytes: 3 }]), [{ offset: 0, bytes: 2 }, { offset: 5, bytes: 5 }]);
+    assert.deepEqual(urgentFirst(joined(far, 2, 1000), far).map(run => run.offset), [100, 0]);
 });
 
 await check('first picture: at most 3 requests and 400 KB', async () => {
@@ -188,26 +121,6 @@ await check('resolution follows the time that moving pictures take', () => {
     for (let frame = 0; frame < 12; ++frame) scale = movingScale(scale, 1e5);
     assert.equal(scale, 0.1, 'no less than that');
 });
-
-/// A worker that casts, in this thread.
-class CasterHere {
-    static async beside(first, shareBytes) {
-        const made = new CasterHere();
-        made.module = await Module.load(first.compiled);
-        made.module.follow(first.lead());
-        made.caster = new Caster(made, shareBytes);
-        made.onmessage({ data: { type: 'ready' } });
-        return made;
-    }
-    postMessage({ view, sample, begun, records, pages, dropped, first, count, shows }) {
-        for (const number of dropped) this.module.dropPage(number);
-        for (const { number, bytes } of pages) this.module.takePage(number, bytes);
-        this.module.look(view);
-        const { rows } = this.module.beginCopied(records, sample, begun);
-        const done = this.module.castBands(view, rows, first, count, shows);
-        setTimeout(() => this.onmessage({ data: { type: 'cast', ...done, said: this.module.said(), memoryBytes: 0 } }));
-    }
-}
 
 await check('bands cast from copies are those of the pool; no more is copied than is allowed', async () => {
     const ranges = new Ranges('scan.vcp', server(file)), module = await opened(ranges), info = module.info();
@@ -337,7 +250,7 @@ function* hostileFiles() {
 }
 
 /// Opens what one may, looks at it from near and far, and points at it. Returns the line that says why not, or '', and
-/// whether anything was drawn.
+/// whether anything was drawn, how many JPEGs were decoded, and how many tiles of images were there.
 function useHostile(module, content) {
     module.begin(content.length, 'fuzz.vcp', 8 << 20);
     module.supply(0, content);
@@ -345,10 +258,10 @@ function useHostile(module, content) {
         assert.ok(module.open());
     } catch (error) {
         if (error instanceof WebAssembly.RuntimeError) throw error;
-        return { said: error.message, isDrawn: false };
+        return { said: error.message, isDrawn: false, decoded: 0, levels: 0 };
     }
     const orbit = new Orbit(), info = module.info();
-    let isDrawn = false;
+    let isDrawn = false, decoded = 0, tiles = 0;
     orbit.fit(info.boundsMin, info.boundsMax, 1);
     for (const nearer of [1, 0.05]) {
         orbit.zoom(nearer, 0, 0);
@@ -356,24 +269,32 @@ function useHostile(module, content) {
         for (let round = 0; round < 8; ++round) {
             const update = module.update();
             assert.ok(!update.problem?.includes('\n'));
+            for (const { id, width, height } of module.jpegs()) {
+                decoded += id % 4 === 0 ? 0 : 1;
+                module.putJpeg(id, id % 4 === 0 ? null : new Uint8Array(4 * width * height));
+            }
             if (update.drawable) {
                 cast(module, 0, 32, 32);
                 module.pick(16, 16);
+                tiles = Math.max(tiles, module.needed(0, 32).tiles.length / 16);
                 isDrawn = true;
             }
             if (update.settled) break;
         }
     }
-    return { said: '', isDrawn };
+    return { said: '', isDrawn, decoded, tiles };
 }
 
 await check('hostile files: the lines of the program, no trap, no growth', async () => {
-    let module = await Module.load(wasm), refused = 0, opened = 0, drawn = 0, traps = [], other = [], most = 0, i = 0;
+    let module = await Module.load(wasm), refused = 0, opened = 0, drawn = 0, imaged = 0, jpegs = 0, traps = [], other = [], most = 0, i = 0;
     for (const { content, line } of hostileFiles()) {
-        let said, isDrawn;
+        let said;
         try {
-            ({ said, isDrawn } = useHostile(module, content));
-            drawn += isDrawn ? 1 : 0;
+            const used = useHostile(module, content);
+            said = used.said;
+            drawn += used.isDrawn ? 1 : 0;
+            imaged += used.tiles > 0 ? 1 : 0;
+            jpegs += used.decoded;
         } catch (error) {
             traps.push(`${i}: ${error.message}`);
             module = await Module.load(wasm);
@@ -388,8 +309,9 @@ await check('hostile files: the lines of the program, no trap, no growth', async
         if (line !== '' && said !== undefined && said !== line) other.push(`${i}: ${said} instead of ${line}`);
         ++i;
     }
-    console.log(`   ${i} files: ${opened} opened, ${drawn} drawn, ${refused} refused; at most ${most} bytes of memory`);
-    assert.ok(drawn > 100 && refused > 100);
+    console.log(`   ${i} files: ${opened} opened, ${drawn} drawn, ${imaged} with images, and ${jpegs} JPEGs; ${refused} refused; at most ${most} ` +
+        'bytes of memory');
+    assert.ok(drawn > 100 && refused > 100 && imaged > 50 && jpegs > 50);
     assert.deepEqual(traps, []);
     assert.deepEqual(other, []);
     assert.ok(most < 64 << 20);

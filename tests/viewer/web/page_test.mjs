@@ -1,5 +1,6 @@
-// A published page in headless Chromium: page_test.mjs VCP FOLDER PICTURES
-// FOLDER: as `vcp publish` makes it. PICTURES: folder for what is seen.
+// A published page in headless Chromium: page_test.mjs VCP FOLDER PICTURES [images]
+// FOLDER: as `vcp publish` makes it. PICTURES: folder for what is seen. images: the scan is textured_scene.mjs', without
+// loss, and the folder has it with JPEGs as well, as jpeg.vcp; what concerns images is tested.
 import assert from 'node:assert/strict';
 import { execFileSync, spawn } from 'node:child_process';
 import fs from 'node:fs';
@@ -8,9 +9,9 @@ import path from 'node:path';
 import { pathToFileURL } from 'node:url';
 import zlib from 'node:zlib';
 import { Browser } from './browser.mjs';
-import { compareDepth, readDepth } from './native_depth.mjs';
+import { compareColours, compareDepth, readDepth, readPicture } from './native_picture.mjs';
 
-const [vcp, folder, pictures] = process.argv.slice(2);
+const [vcp, folder, pictures, kind] = process.argv.slice(2);
 // Read as a module whatever the nearest package.json says.
 fs.copyFileSync(path.join(folder, 'camera.js'), path.join(pictures, 'camera.mjs'));
 const { Orbit, kFieldOfView } = await import(pathToFileURL(path.resolve(pictures, 'camera.mjs')));
@@ -18,9 +19,13 @@ const { Orbit, kFieldOfView } = await import(pathToFileURL(path.resolve(pictures
 const kTypes = { '.html': 'text/html', '.js': 'text/javascript', '.wasm': 'application/wasm' };
 const kLead = 64 << 10; // bytes of the viewer's first request
 const scan = fs.readFileSync(path.join(folder, 'scan.vcp'));
+const kFromEnd = 300; // a byte so far from the end of a file with images is one of its last tile
 
 /// The server, what it does wrong with the scan, and what it was asked for.
-let wrong = '', asked = { scan: 0, bytes: 0, missing: [], methods: new Set() };
+let wrong = '', asked = nothingAsked();
+function nothingAsked() {
+    return { scan: 0, bytes: 0, ranges: [], missing: [], methods: new Set() };
+}
 function serve(request, answer) {
     const name = new URL(request.url, 'http://here').pathname.slice(1) || 'index.html', file = path.join(folder, name);
     asked.methods.add(request.method);
@@ -29,13 +34,17 @@ function serve(request, answer) {
         return answer.writeHead(404).end();
     }
     const headers = { 'Content-Type': kTypes[path.extname(name)] ?? 'application/octet-stream', 'Cache-Control': 'no-store' };
-    if (name !== 'scan.vcp') return answer.writeHead(200, headers).end(fs.readFileSync(file));
+    const content = name === 'scan.vcp' ? scan : fs.readFileSync(file);
+    if (!name.endsWith('.vcp')) return answer.writeHead(200, headers).end(content);
     ++asked.scan;
     if (wrong === 'down' || (wrong === 'gone' && asked.scan > 2)) return request.socket.destroy();
     const range = /^bytes=(\d+)-(\d+)$/.exec(request.headers.range ?? '');
-    if (!range || wrong === 'ranges') return answer.writeHead(200, headers).end(scan);
-    const first = Number(range[1]), part = scan.subarray(first, Number(range[2]) + 1);
-    headers['Content-Range'] = `bytes ${first}-${first + part.length - 1}/${scan.length}`;
+    if (!range || wrong === 'ranges') return answer.writeHead(200, headers).end(content);
+    const first = Number(range[1]), part = Buffer.from(content.subarray(first, Number(range[2]) + 1));
+    headers['Content-Range'] = `bytes ${first}-${first + part.length - 1}/${content.length}`;
+    const damaged = content.length - kFromEnd - first;
+    if (wrong === 'tile' && damaged >= 0 && damaged < part.length) part[damaged] ^= 1;
+    asked.ranges.push({ first, end: first + part.length });
     headers.ETag = wrong === 'replaced' && asked.scan > 1 ? '"b"' : '"a"';
     if (request.headers.origin)
         Object.assign(headers, { 'Access-Control-Allow-Origin': '*', 'Access-Control-Expose-Headers': 'Content-Range' });
@@ -56,7 +65,7 @@ process.on('exit', () => browser.process.kill('SIGKILL'));
 /// Opens the page and waits until it has settled or shows a problem.
 async function open(width, height, { fault = '', link = '', touch = false, site = address } = {}) {
     wrong = fault;
-    asked = { scan: 0, bytes: 0, missing: [], methods: new Set() };
+    asked = nothingAsked();
     const page = await browser.page(width, height, touch);
     await page.call('Page.addScriptToEvaluateOnNewDocument', { source: `window.state = { picks: [] };
         addEventListener('progress', event => { state.last = event.detail; state.first ??= event.detail; });
@@ -130,19 +139,25 @@ async function lights() {
     await closeGood(page);
 }
 
+/// Opens a scan that so many workers cast.
+async function openShared(workers, file) {
+    const page = await open(kSharedWidth, 200);
+    await change(page, `viewer.setAttribute('workers', ${workers}); viewer.src = '${file}?${workers}'; viewer.info = null`);
+    // The others take part from the second picture on.
+    await page.until(`viewer.info !== null`);
+    for (let i = 0; i < 100 && await page.evaluate('state.last.workers') < workers; ++i) await change(page, 'viewer.look(false)');
+    assert.equal(await page.evaluate('state.last.workers'), workers);
+    return page;
+}
+const kSharedWidth = 160; // bands lie above each other, so this may be small
+
 /// The picture does not depend on how many workers cast it, nor does what is fetched.
 async function shares() {
     const kinds = ['', `viewer.setAttribute('shadows', '')`, `viewer.setAttribute('occlusion', '')`,
         `viewer.setAttribute('section', '-x,0.5')`, `viewer.setAttribute('mode', 'level')`];
     const pictures = [];
     for (const workers of [1, 3]) {
-        const page = await open(320, 200, { link: '' });
-        await change(page, `viewer.setAttribute('workers', ${workers}); viewer.src = 'scan.vcp?${workers}'; viewer.info = null`);
-        // The others take part from the second picture on.
-        await page.until(`viewer.info !== null`);
-        for (let i = 0; i < 100 && await page.evaluate('state.last.workers') < workers; ++i) await change(page, 'viewer.look(false)');
-        assert.equal(await page.evaluate('state.last.workers'), workers);
-        const seen = [];
+        const page = await openShared(workers, 'scan.vcp'), seen = [];
         for (const kind of kinds) {
             await change(page, `${kind}; viewer.camera = '${kCameras.close.join(',')}'`);
             seen.push(await shown(page));
@@ -153,7 +168,7 @@ async function shares() {
         await closeGood(page);
     }
     // One that ends while it casts is done without.
-    const page = await open(320, 200);
+    const page = await open(kSharedWidth, 200);
     await change(page, `viewer.setAttribute('workers', 2); viewer.src = 'scan.vcp?lost'`);
     for (let i = 0; i < 100 && await page.evaluate('state.last.workers') < 2; ++i) await change(page, 'viewer.look(false)');
     await change(page, `viewer.camera = '${kCameras.close.join(',')}'; viewer.look(false);
@@ -165,17 +180,84 @@ async function shares() {
     assert.equal(new Set(pictures[0]).size, pictures[0].length, 'each shows something else');
 }
 
+/// What the program sees from an orbit's camera. Returns depths, and the path of the picture.
+function nativeView(name, orbit, width, height, more = [], file = 'scan.vcp') {
+    const path_ = end => path.join(pictures, `${name}.${end}`);
+    const camera = { position: orbit.eye(), target: orbit.target, fov_degrees: kFieldOfView * 180 / Math.PI };
+    fs.writeFileSync(path_('json'), JSON.stringify(camera));
+    execFileSync(vcp, ['render', path.join(folder, file), '--device', 'host', '--camera', path_('json'), '--size', `${width}x${height}`,
+        '--depth', path_('pfm'), '-o', path_('png'), '--overwrite', '--progress', 'none', ...more]);
+    return { depth: readDepth(path_('pfm'), width, height), picture: path_('png') };
+}
+
+/// The colours of images are those of the program: without loss the same, and JPEGs as near as browsers' decoders are
+/// to libjpeg. The first picture does not wait for them, and nothing is fetched twice.
+async function sharpens() {
+    const page = await open(kImageSize[0], kImageSize[1]);
+    await page.evaluate(`addEventListener('progress', () => { state.shown ??= part('canvas').toDataURL(); });
+        viewer.setAttribute('mode', 'unlit'); viewer.setAttribute('budget', 64);`);
+    for (const [file, tolerance] of [['scan.vcp', 1], ['jpeg.vcp', 4]]) {
+        asked = nothingAsked();
+        await change(page, `viewer.src = '${file}?anew'; viewer.info = state.first = state.shown = null`);
+        await page.until('viewer.info !== null && Boolean(state.settled)');
+        const first = await page.evaluate('state.first');
+        assert.ok(first.requests <= 4 && first.bytes <= 400e3, `${first.requests} requests, ${first.bytes} bytes`);
+        assert.notEqual(await page.evaluate('state.shown'), await shown(page), 'images come later');
+        for (const [name, camera] of Object.entries(kImageCameras)) {
+            await change(page, `viewer.camera = '${camera.join(',')}'`);
+            await looksNative(page, name, camera, file, tolerance);
+        }
+        const ranges = asked.ranges.sort((a, b) => a.first - b.first);
+        ranges.slice(1).forEach((one, i) => assert.ok(ranges[i].end <= one.first, `byte ${one.first} is fetched twice`));
+        console.log(`${file}: first picture ${first.requests} requests, ${first.bytes} bytes; ${asked.scan} requests, ${asked.bytes} bytes`);
+    }
+    await closeGood(page);
+}
+async function looksNative(page, name, camera, file, tolerance) {
+    const orbit = new Orbit(), [width, height] = kImageSize;
+    assert.ok(orbit.fromText(camera.join(',')));
+    const { depth, picture } = nativeView(`${file}_${name}`, orbit, width, height, ['--samples', '8', '--shading', 'unlit'], file);
+    const isInside = i => [-1, 0, 1].every(dx => [-1, 0, 1].every(dy => Number.isFinite(depth[i + dx + dy * width])));
+    const ours = Buffer.from(await page.evaluate(`btoa(Array.from(part('canvas').getContext('2d')
+        .getImageData(0, 0, ${width}, ${height}).data, x => String.fromCharCode(x)).join(''))`), 'base64');
+    const { differ, counted, mean, most } = compareColours(ours, readPicture(picture), tolerance, isInside);
+    console.log(`${file}, ${name}: ${differ} of ${counted} pixels differ by more than ${tolerance} of 255; ${mean.toFixed(3)} in the mean, ` +
+        `at most ${most}`);
+    assert.ok(counted > 10000 && differ <= counted / 1000);
+}
+const kImageSize = [320, 200], kImageCameras = { whole: [2, 0.5, 1.5, 6, 0.1, 0.4], close: [1.6, 0.2, 0.8, 1.6, 0.2, 0.3] };
+/// Images are the same whoever casts.
+async function sharesImages() {
+    const seen = [];
+    for (const workers of [1, 3]) {
+        const page = await openShared(workers, 'jpeg.vcp');
+        for (const camera of Object.values(kImageCameras)) {
+            await change(page, `viewer.camera = '${camera.join(',')}'`);
+            seen.push(await shown(page));
+        }
+        assert.equal(await page.evaluate('state.last.workers'), workers);
+        await closeGood(page);
+    }
+    assert.deepEqual(seen.slice(0, 2), seen.slice(2));
+    assert.notEqual(seen[0], seen[1]);
+}
+
+/// A tile that is damaged is one line in the page, and all else is drawn.
+async function missesTile() {
+    const page = await open(320, 200, { fault: 'tile' });
+    await change(page, `viewer.camera = '${kImageCameras.close.join(',')}'`);
+    await page.until('Boolean(state.settled)');
+    assert.match(await status(page), /tile \d+.*hash does not match/);
+    await page.close();
+}
+
 const kCameras = { whole: [0, 0.86, 0, 8, 0.5, 0.4], close: [0, 1.1, 0, 1.6, 0.3, 0.35] };
 /// The depth of each pixel and two measured points, against those of the program; a link leads to the same picture.
 async function measures(name, width, height) {
     const page = await open(width, height), orbit = new Orbit(), camera = kCameras[name].join(',');
     assert.ok(orbit.fromText(camera));
     await change(page, `viewer.camera = '${camera}'`);
-    const file = path.join(pictures, `${name}.json`), pfm = path.join(pictures, `${name}.pfm`), eye = orbit.eye();
-    fs.writeFileSync(file, JSON.stringify({ position: eye, target: orbit.target, fov_degrees: kFieldOfView * 180 / Math.PI }));
-    execFileSync(vcp, ['render', path.join(folder, 'scan.vcp'), '--device', 'host', '--camera', file, '--size',
-        `${width}x${height}`, '--depth', pfm, '-o', path.join(pictures, `${name}.png`), '--overwrite', '--progress', 'none']);
-    const native = readDepth(pfm, width, height), cell = await page.evaluate('viewer.info.cell');
+    const { depth: native } = nativeView(name, orbit, width, height), cell = await page.evaluate('viewer.info.cell'), eye = orbit.eye();
     const ours = await page.evaluate(`Promise.all(Array.from({ length: ${width * height} }, (_, i) =>
         viewer.pick(i % ${width} + 0.5, Math.floor(i / ${width}) + 0.5).then(hit => hit?.depth ?? null)))`);
     const { differ, hits } = compareDepth(ours.map(depth => depth ?? Infinity), native, 1e-3 * cell);
@@ -399,24 +481,28 @@ async function serves() {
     server.kill('SIGINT');
 }
 
-if (scan.length > 512 << 10) {
+/// Runs a step and says how long it took.
+async function step(run, ...all) {
+    const began = performance.now();
+    await run(...all);
+    console.log(`   ${[run.name, ...all].join(' ')}: ${((performance.now() - began) / 1e3).toFixed(1)} s`);
+}
+
+if (kind === 'images') {
+    for (const run of [sharpens, sharesImages, missesTile]) await step(run);
+} else if (scan.length > 512 << 10) {
     // Of the larger scans, whose pages outnumber a small budget.
-    await leaves();
-    await wanders();
+    await step(leaves);
+    await step(wanders);
 } else {
-    await hears();
-    await looks(1600, 1000, false);
-    await looks(390, 844, true);
-    await complains();
-    await lights();
+    if (scan.length <= kLead) await step(hears); // whatever the scan
+    await step(looks, 1600, 1000, false);
+    await step(looks, 390, 844, true);
+    await step(complains);
+    await step(lights);
     if (scan.length > kLead) {
-        for (const name of Object.keys(kCameras)) await measures(name, 320, 200);
-        await shares();
-        await moves();
-        await annotates();
-        await returns();
-        await crosses();
-        await serves();
+        for (const name of Object.keys(kCameras)) await step(measures, name, 320, 200);
+        for (const run of [shares, moves, annotates, returns, crosses, serves]) await step(run);
     }
 }
 await browser.close();

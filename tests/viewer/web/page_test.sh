@@ -22,3 +22,9 @@ for triangles in 10000 60000 300000; do
     mkdir "pictures$triangles"
     "$node" "$here/page_test.mjs" "$vcp" "site$triangles" "pictures$triangles"
 done
+"$node" "$here/textured_scene.mjs" . 200 1024
+"$vcp" build textured.obj -o scan.vcp --colour-quality lossless --overwrite --progress none
+"$vcp" publish scan.vcp -o siteimages --viewer "$web" >/dev/null
+"$vcp" build textured.obj -o siteimages/jpeg.vcp --colour-quality 85 --overwrite --progress none
+mkdir picturesimages
+"$node" "$here/page_test.mjs" "$vcp" siteimages picturesimages images

@@ -20,8 +20,23 @@ for view in whole close; do
 done
 "$make_scan" --triangles 10000 --colour -o small.ply
 "$vcp" build small.ply -o small.vcp --overwrite --progress none
-"$hostile_files" hostile.bin 1000 "$here"/../../fuzz/seeds/fuzz_file/* small.vcp
+mkdir -p small textured
+"$node" "$here/textured_scene.mjs" small 20 96
+"$node" "$here/textured_scene.mjs" textured 200 1024
+echo '{ "position": [2, 2.2, 5], "target": [2, 0.4, 0.5], "fov_degrees": 34 }' >textured/whole.json
+echo '{ "position": [1.2, 0.6, 1.6], "target": [1.6, 0.1, 0.2], "fov_degrees": 34 }' >textured/close.json
+for in in small textured; do
+    for kind in lossless=lossless jpeg=85; do
+        "$vcp" build $in/textured.obj -o $in/${kind%=*}.vcp --colour-quality ${kind#*=} --overwrite --progress none
+    done
+done
+for view in whole close; do
+    "$vcp" render textured/lossless.vcp --device host --camera textured/$view.json --size 320x200 --samples 1 --shading unlit \
+        --depth textured/$view.pfm -o textured/$view.png --overwrite --progress none
+done
+"$hostile_files" hostile.bin 2000 "$here"/../../fuzz/seeds/fuzz_file/* small.vcp small/lossless.vcp small/jpeg.vcp
 "$node" "$here/module_test.mjs" "$folder" scan.vcp hostile.bin whole close
+"$node" "$here/image_test.mjs" "$folder" textured
 # The folder is a package for npm that needs no other one.
 if command -v npm >/dev/null; then
     (cd "$web" && npm pack --dry-run --json --offline 2>/dev/null) >package_files.json

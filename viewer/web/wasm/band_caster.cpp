@@ -69,6 +69,7 @@ Result<void> BandCaster::begin(const Dataset& dataset, bool withColour, const Ba
     frame_ = frame;
     scene_.reset();
     VCP_TRY_ASSIGN(scene_, CutScene::create(dataset.header, withColour, std::move(cut)));
+    scene_->showImages(frame.images);
     marks_.reset();
     if (frame.asksRays) marks_.emplace(scene_->scene().pages());
     feedback_ = {};

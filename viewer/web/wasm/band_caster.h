@@ -5,6 +5,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
@@ -16,10 +17,11 @@ namespace vcp {
 
 /// What a sample of a picture is cast with, beside the pages.
 struct BandFrame {
-    FrameRequest request;    ///< of the whole picture, and of this sample
-    double errorPixels = 0;  ///< of the cut (UpdateResult)
-    bool asksRays = false;   ///< rays are to say which pages they hit
-    bool listens = false;    ///< and some of them, where
+    FrameRequest request;                    ///< of the whole picture, and of this sample
+    double errorPixels = 0;                  ///< of the cut (UpdateResult)
+    bool asksRays = false;                   ///< rays are to say which pages they hit
+    bool listens = false;                    ///< and some of them, where
+    std::shared_ptr<const ImageSet> images;  ///< to draw from; null: none
 };
 
 /// What rays said, in any number of bands.

@@ -23,6 +23,11 @@ Result<void> FetchedBytes::read(uint64_t offset, std::span<std::byte> bytes) con
         return Error{
             .code = ErrorCode::Io, .message = "the file ends here; it was truncated", .file = name_, .byte = offset};
     const uint64_t end = offset + bytes.size();
+    if (end > refusedBehind_)
+        return Error{.code = ErrorCode::Limit,
+                     .message = "the tables of its images are too large for a browser, which shows none of these",
+                     .file = name_,
+                     .byte = offset};
     bool isWhole = true;
     for (uint64_t at = offset; at < end;) {
         // The bytes may lie in several pieces, with or without gaps between them.

@@ -23,6 +23,8 @@ public:
         : size_(size), mostBytes_(mostBytes), name_(std::move(name)) {}
 
     void supply(uint64_t offset, std::vector<std::byte> bytes);
+    /// Reads that end behind `end` fail as Limit, from now on.
+    void refuseBehind(uint64_t end) { refusedBehind_ = end; }
     /// Returns what was missing since the last call.
     std::vector<Stretch> takeMissing();
 
@@ -37,7 +39,7 @@ private:
         uint64_t offset;
         std::vector<std::byte> bytes;
     };
-    uint64_t size_, mostBytes_;
+    uint64_t size_, mostBytes_, refusedBehind_ = UINT64_MAX;
     std::string name_;
     mutable std::list<Piece> pieces_;  // the oldest first
     mutable std::vector<Stretch> missing_;

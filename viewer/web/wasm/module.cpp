@@ -21,7 +21,10 @@
 #include "render/residencies.h"
 #include "viewer/web/wasm/band_caster.h"
 #include "viewer/web/wasm/fetched_bytes.h"
+#include "viewer/web/wasm/image_copies.h"
+#include "viewer/web/wasm/jpeg_tiles.h"
 #include "viewer/web/wasm/page_copies.h"
+#include "viewer/web/wasm/tile_source.h"
 
 #define EXPORT(name) extern "C" __attribute__((export_name(#name)))
 
@@ -31,6 +34,9 @@ using namespace vcp;
 
 constexpr int kFailed = -1, kDone = 0, kMissing = 1;
 constexpr uint64_t kFetchedBytes = 8u << 20, kUploadBytes = 4u << 20;
+// What is read of a section of images first, and the most that its tables may be: fetched bytes have room for them.
+constexpr uint64_t kImagesLead = 64u << 10, kMostTableBytes = 6u << 20;
+constexpr uint32_t kTableAttempts = 4;
 
 /// What a worker that holds no pages must know of the scan.
 struct Lead {
@@ -39,22 +45,38 @@ struct Lead {
     uint64_t hasColour;
 };
 
+/// A JPEG tile for the browser to decode.
+struct WantedTile {
+    uint32_t id, width, height, bytes, address;
+};
+
+/// How far the images of the file have come: nothing of them is read before a page is drawn that shows some.
+enum class Images : uint8_t { Awaited, Shown, GivenUp };
+
 /// What is open.
 struct Opened {
     std::shared_ptr<FetchedBytes> bytes;
     std::shared_ptr<const Dataset> dataset;
     bool hasColour = false;
-    std::vector<PlacedResidency> placed;  // one, in the worker that holds the pages
-    uint64_t budgetBytes = 0;
+    std::vector<PlacedDataset> datasets;       // one, in the worker that holds the pages
+    std::vector<PlacedResidency> placed;       // that of it
+    uint64_t budgetBytes = 0, imageBytes = 0;  // of all, and of images in it
+    Images images = Images::GivenUp;
+    uint32_t tableFailures = 0;
     double errorPixels = 0;  // of the last update
     PagesNeeded needed;
     PageCopies copies;
+    ImageCopies imageCopies;
     FrameRequest request;
-    SelectionView view;  // of the sample begun last
-    uint64_t cut = 0;    // number of the picture's cut
+    SelectionView view;           // of the sample begun last
+    uint64_t cut = 0, pages = 0;  // numbers of the picture's cut, and of its pages alone
     BandCaster caster;
     BandsSaid heard;
     std::vector<CutRecord> records;
+    std::vector<TileRecord> tiles;
+    std::vector<std::byte> tables;
+    std::vector<JpegTiles::Wanted> jpegs;
+    WantedTile jpeg;
     std::vector<double> said;
     Lead lead;
     std::vector<Stretch> missing;
@@ -73,21 +95,62 @@ Result<void> start(Dataset dataset) {
     opened.dataset = std::make_shared<const Dataset>(std::move(dataset));
     VCP_TRY(checkBudget(opened.budgetBytes));
     VCP_TRY(checkHostDraws(*opened.dataset, opened.bytes->name()));
-    std::vector<PlacedDataset> datasets(1);
-    datasets[0].dataset = opened.dataset;
-    datasets[0].source = std::make_shared<FilePageSource>(opened.bytes, opened.dataset);
-    const RendererOptions options{.budgetBytes = opened.budgetBytes, .uploadBytes = kUploadBytes};
-    VCP_TRY_ASSIGN(opened.placed, openResidencies(hostPageMemory(), options, std::move(datasets)));
+    opened.datasets.resize(1);
+    opened.datasets[0].dataset = opened.dataset;
+    opened.datasets[0].source = std::make_shared<TileSource>(opened.bytes, opened.dataset);
+    if (opened.dataset->hasImages()) {
+        opened.images = Images::Awaited;
+        opened.imageBytes = budgetOfImages(opened.budgetBytes);
+    }
+    const RendererOptions options{.budgetBytes = opened.budgetBytes - opened.imageBytes, .uploadBytes = kUploadBytes};
+    VCP_TRY_ASSIGN(opened.placed, openResidencies(hostPageMemory(), options, opened.datasets));
     opened.errorPixels = std::numeric_limits<double>::infinity();
     opened.hasColour = residency().hasColour();
     return {};
 }
 
+/// Whether some page that is drawn has triangles with images.
+bool drawsImages() {
+    const std::vector<CutPage> cut = cutPages(residency());
+    return std::any_of(cut.begin(), cut.end(), [](const CutPage& page) {
+        const auto geometry = page.bytes.first(page.entry.pageBytes), colours = page.bytes.subspan(geometry.size());
+        return !viewOfChecked(geometry, colours).points.empty();
+    });
+}
+
+/// Reads the tables of the images, and shows these from the next update on. Errors: Cancelled, where bytes have not
+/// come; Limit, InvalidInput.
+Result<void> showImages() {
+    const ImagesPlace& place = opened.dataset->header.images;
+    std::vector<std::byte> lead(std::min(place.bytes, kImagesLead));
+    VCP_TRY(opened.bytes->read(place.offset, lead));
+    opened.bytes->refuseBehind(place.offset + kMostTableBytes);
+    auto found = findImages(opened.datasets, true, opened.imageBytes);
+    opened.bytes->refuseBehind(UINT64_MAX);
+    if (!found) return found.error();
+    return sceneOf(opened.placed)->showImages(0, std::move(found->pieces[0]), found->mostBytes[0]);
+}
+
+/// Goes on with images that are awaited: until they are shown or given up, nothing is settled.
+void awaitImages(UpdateResult& update) {
+    update.settled = false;
+    const auto shown = showImages();
+    if (shown) opened.images = Images::Shown;
+    if (shown || shown.error().code == ErrorCode::Cancelled) return;
+    const ImagesPlace& place = opened.dataset->header.images;
+    opened.bytes->distrust(place.offset, std::min(place.bytes, kMostTableBytes));
+    if (shown.error().code == ErrorCode::InvalidInput && ++opened.tableFailures < kTableAttempts) return;
+    opened.images = Images::GivenUp;
+    update.problems.push_back(shown.error());
+}
+
 Result<UpdateResult> update() {
     VCP_TRY(checkRequest(opened.request));
     VCP_TRY(checkHostDraws(opened.request));
+    jpegTiles().beginWalk();
     const ShownResidency shown{&residency(), {}, &opened.errorPixels};
     VCP_TRY_ASSIGN(auto update, updateShown({&shown, 1}, opened.request));
+    if (opened.images == Images::Awaited && drawsImages()) awaitImages(*update);
     return *std::move(update);
 }
 
@@ -112,6 +175,7 @@ EXPORT(vcp_error) const char* vcp_error() { return opened.error.c_str(); }
 /// Begins with a file of `size` bytes, of which nothing is known. `name`: as messages have it.
 EXPORT(vcp_begin) void vcp_begin(double size, const char* name, double budgetBytes) {
     opened = {};
+    jpegTiles() = {};
     opened.budgetBytes = uint64_t(budgetBytes);
     opened.bytes = std::make_shared<FetchedBytes>(uint64_t(size), name, kFetchedBytes);
 }
@@ -195,11 +259,12 @@ EXPORT(vcp_numbers) const double* vcp_numbers() { return opened.numbers; }
 /// bands, 0 where the cut is not the picture's any more. vcp_numbers() are then: rows of a band, error in pixels,
 /// whether rays are asked which pages they hit, and where.
 EXPORT(vcp_begin_sample) int vcp_begin_sample(int sample) {
-    const uint64_t cut = residency().pagesNumber();
+    const uint64_t cut = residency().cutNumber();
     if (sample > 0 && cut != opened.cut) return 0;
     opened.cut = cut;
+    opened.pages = residency().pagesNumber();
     BandFrame frame{opened.request, opened.errorPixels, sample == 0 && residency().asksRays(),
-                    sample == 0 && residency().listens()};
+                    sample == 0 && residency().listens(), residency().images()};
     if (sample > 0) {
         const auto refinable = checkRefinable(frame.request, uint32_t(sample));
         if (!refinable) return fail(refinable.error());
@@ -251,20 +316,46 @@ EXPORT(vcp_end_sample) void vcp_end_sample(int asksRays, int listens) {
     said.add(opened.heard);
     if (asksRays != 0) {
         std::vector<SeenPages> seen;
-        seen.push_back({&residency(), std::move(said.hit), opened.view, opened.cut});
+        seen.push_back({&residency(), std::move(said.hit), opened.view, opened.pages});
         seeAll(std::move(seen));
     }
     if (listens != 0) residency().hear(said.feedback, opened.view);
 }
 
-/// Finds the pages that `count` rows of the picture from `first` on need. Returns how many they are; vcp_records() are
-/// then their CutRecords.
+/// Finds the pages that `count` rows of the picture from `first` on need, and the tiles of images. Returns how many
+/// pages they are; vcp_records() are then their CutRecords, and vcp_tiles() as many TileRecords as it is said.
 EXPORT(vcp_needed) int vcp_needed(int first, int count) {
     opened.records =
         opened.needed.of(*opened.dataset, opened.request, cutPages(residency()), uint32_t(first), uint32_t(count));
+    opened.tiles = tilesNeeded(residency(), selectionView(opened.request), opened.records);
     return int(opened.records.size());
 }
 EXPORT(vcp_records) const CutRecord* vcp_records() { return opened.records.data(); }
+EXPORT(vcp_tiles) const TileRecord* vcp_tiles() { return opened.tiles.data(); }
+EXPORT(vcp_tiles_count) int vcp_tiles_count() { return int(opened.tiles.size()); }
+
+/// Returns the tables of images and materials for vcp_follow_images(). Precondition: images are shown.
+EXPORT(vcp_tables) const std::byte* vcp_tables() {
+    const auto images = opened.datasets[0].source->images();
+    opened.tables = ImageTables{(*images)->tables().images, (*images)->tables().materials, {}}.stored();
+    return opened.tables.data();
+}
+EXPORT(vcp_tables_bytes) int vcp_tables_bytes() { return int(opened.tables.size()); }
+
+/// Returns how many JPEGs are for the browser to decode since the last call.
+EXPORT(vcp_jpegs) int vcp_jpegs() {
+    opened.jpegs = jpegTiles().takeWanted();
+    return int(opened.jpegs.size());
+}
+EXPORT(vcp_jpeg) const WantedTile* vcp_jpeg(int i) {
+    const auto& [id, size, bytes] = opened.jpegs[size_t(i)];
+    opened.jpeg = {id, size.x, size.y, uint32_t(bytes.size()), uint32_t(uintptr_t(bytes.data()))};
+    return &opened.jpeg;
+}
+/// Takes in the texels of a JPEG, RGBA8; none: it cannot be decoded.
+EXPORT(vcp_put_jpeg) void vcp_put_jpeg(int id, const uint32_t* texels, int count) {
+    jpegTiles().put(uint32_t(id), {texels, size_t(count)});
+}
 
 /// Returns what other workers must know of the scan, and how many bytes it is.
 EXPORT(vcp_lead) const Lead* vcp_lead() {
@@ -287,12 +378,24 @@ EXPORT(vcp_room) std::byte* vcp_room(double page, int bytes) {
     return opened.copies.room(uint64_t(page), uint32_t(bytes));
 }
 EXPORT(vcp_drop) void vcp_drop(double page) { opened.copies.drop(uint64_t(page)); }
-/// Does vcp_begin_sample with a cut of pages that were copied.
+/// Begins with images there, of which nothing was copied. `tables`: as vcp_tables() returns them.
+EXPORT(vcp_follow_images) void vcp_follow_images(const std::byte* tables) {
+    const ImagesPlace& place = opened.dataset->header.images;
+    const auto* const images = reinterpret_cast<const ImageRow*>(tables);
+    const auto* const materials = reinterpret_cast<const MaterialRow*>(images + place.images);
+    opened.imageCopies = ImageCopies({{images, images + place.images}, {materials, materials + place.materials}, {}});
+}
+EXPORT(vcp_tile_room) std::byte* vcp_tile_room(double number) { return opened.imageCopies.room(uint32_t(number)); }
+EXPORT(vcp_tile_drop) void vcp_tile_drop(double number) { opened.imageCopies.drop(uint32_t(number)); }
+/// Does vcp_begin_sample with a cut of pages, and tiles of images, that were copied.
 EXPORT(vcp_begin_copied)
-int vcp_begin_copied(const CutRecord* records, int count, int sample, double errorPixels, int asksRays, int listens) {
+int vcp_begin_copied(const CutRecord* records, int count, const TileRecord* tiles, int tileCount, int sample,
+                     double errorPixels, int asksRays, int listens) {
     auto cut = opened.copies.cutOf({records, size_t(count)});
     if (!cut) return fail(cut.error());
-    BandFrame frame{opened.request, errorPixels, asksRays != 0, listens != 0};
+    const auto images = opened.imageCopies.setOf({tiles, size_t(tileCount)});
+    if (!images) return fail(images.error());
+    BandFrame frame{opened.request, errorPixels, asksRays != 0, listens != 0, *images};
     frame.request.sample = uint32_t(sample);
     return beginSample(frame, *std::move(cut));
 }
