@@ -49,14 +49,17 @@ public:
 
     /// `material`: of the three points.
     void add(const TexturePoint& a, const TexturePoint& b, const TexturePoint& c, const MaterialRow& material) {
-        const Range u = range(std::min({a.u, b.u, c.u}), std::max({a.u, b.u, c.u}), size_.x, material.wrapU);
-        const Range v = range(std::min({a.v, b.v, c.v}), std::max({a.v, b.v, c.v}), size_.y, material.wrapV);
-        const int size = int(across_);
-        for (int64_t y = v.first; y <= v.last; ++y) {
-            const int row = f32::wrappedTexel(int(y), size, uint32_t(material.wrapV));
-            for (int64_t x = u.first; x <= u.last; ++x)
-                has_[size_t(row * size + f32::wrappedTexel(int(x), size, uint32_t(material.wrapU)))] = true;
-        }
+        if (count_ == has_.size()) return;
+        const auto columns = wrapped(
+            range(std::min({a.u, b.u, c.u}), std::max({a.u, b.u, c.u}), size_.x, material.wrapU), material.wrapU);
+        const auto rows = wrapped(range(std::min({a.v, b.v, c.v}), std::max({a.v, b.v, c.v}), size_.y, material.wrapV),
+                                  material.wrapV);
+        for (const uint32_t row : rows)
+            for (const uint32_t column : columns) {
+                const size_t at = size_t{row} * across_ + column;
+                count_ += has_[at] ? 0 : 1;
+                has_[at] = true;
+            }
     }
     [[nodiscard]] std::vector<uint16_t> all() const {
         std::vector<uint16_t> blocks;
@@ -81,12 +84,23 @@ private:
         // After two repetitions all were there, mirrored or not.
         const int64_t period = 2 * int64_t{across_};
         const int64_t before = int64_t(std::floor(double(range.first) / double(period))) * period;
-        return {range.first - before, std::min(range.last, range.first + period) - before};
+        return {range.first - before, std::min(range.last, range.first + period - 1) - before};
+    }
+
+    /// Returns the blocks that are shown in a range, each once.
+    [[nodiscard]] std::vector<uint32_t> wrapped(Range range, ImageWrap wrap) const {
+        std::vector<uint32_t> blocks;
+        for (int64_t at = range.first; at <= range.last; ++at)
+            blocks.push_back(uint32_t(f32::wrappedTexel(int(at), int(across_), uint32_t(wrap))));
+        std::sort(blocks.begin(), blocks.end());
+        blocks.erase(std::unique(blocks.begin(), blocks.end()), blocks.end());
+        return blocks;
     }
 
     uint32_t across_;
     glm::uvec2 size_;
     std::vector<bool> has_;
+    size_t count_ = 0;  // of those that are set
 };
 
 // Images of so many blocks across are needed in parts: of what is near, more is needed than of the rest of a page.
@@ -170,15 +184,14 @@ uint32_t blocksAcross(const ImageRow& image) {
 std::vector<uint32_t> piecesNeeded(const ImagePieces& pieces, const ImageNeed& need, uint32_t level) {
     const ImageLevel& of = pieces.levelsOf(need.image)[level];
     const uint32_t across = blocksAcross(pieces.tables().images[need.image]);
-    std::vector<bool> has(of.tiles());
+    std::vector<uint32_t> needed;
     for (const uint16_t block : need.blocks)
         forEachTile(texelsOf(block / across, across, of.height, level), of.height, of.tileEdge, [&](uint32_t row) {
-            forEachTile(texelsOf(block % across, across, of.width, level), of.width, of.tileEdge,
-                        [&](uint32_t column) { has[size_t{row} * of.tilesX() + column] = true; });
+            forEachTile(texelsOf(block % across, across, of.width, level), of.width, of.tileEdge, [&](uint32_t column) {
+                const auto piece = uint32_t(pieces.pieceOf(need.image, level, {column, row}));
+                if (needed.empty() || needed.back() != piece) needed.push_back(piece);
+            });
         });
-    std::vector<uint32_t> needed;
-    for (uint32_t i = 0; i < has.size(); ++i)
-        if (has[i]) needed.push_back(uint32_t(pieces.pieceOf(need.image, level, {i % of.tilesX(), i / of.tilesX()})));
     std::sort(needed.begin(), needed.end());
     needed.erase(std::unique(needed.begin(), needed.end()), needed.end());
     return needed;

@@ -18,7 +18,8 @@ std::vector<ImageNeed> imageNeeds(const ImageTables& tables, const PageView& pag
 /// there (octree/shared/image_lookup.h) reads a finer one.
 uint32_t finestNeeded(float texelsPerCell, double pixelEdge, uint32_t levels);
 
-/// Returns into how many blocks an image is divided along both axes; they are as wide as kFirstEdge texels, or wider.
+/// Returns into how many blocks an image is divided along both axes: along the longer one they are kFirstEdge texels or
+/// more.
 uint32_t blocksAcross(const ImageRow& image);
 
 /// Returns the pieces of a level that pixels read where the level is the finest that the need asks for, or the next

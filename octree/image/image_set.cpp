@@ -31,14 +31,12 @@ void ImageSet::set(uint32_t number, uint32_t level, glm::uvec2 tile, Tile texels
     const uint64_t bytes = to.texelsOf(at) * sizeof(uint32_t);
     Tile& there = to.tiles[at];
     bytes_ += (texels ? bytes : 0) - (there ? bytes : 0);
+    to.there += size_t{texels ? 1u : 0u} - size_t{there ? 1u : 0u};
     there = std::move(texels);
-    const auto isEmpty = [](const Level& one) {
-        return std::all_of(one.tiles.begin(), one.tiles.end(), [](const Tile& each) { return each == nullptr; });
-    };
     if (there)
         image.finest = std::min(image.finest, level);
     else
-        while (image.finest < image.levels.size() && isEmpty(image.levels[image.finest])) ++image.finest;
+        while (image.finest < image.levels.size() && image.levels[image.finest].there == 0) ++image.finest;
 }
 
 }  // namespace vcp

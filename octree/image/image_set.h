@@ -25,6 +25,7 @@ public:
         uint32_t log2Edge;        ///< of its tiles
         uint32_t tilesX;          ///< tiles of a row
         std::vector<Tile> tiles;  ///< row by row
+        size_t there = 0;         ///< how many of them are in memory
 
         /// Returns the texels of the tile that has a texel; null where they are not in memory.
         [[nodiscard]] const uint32_t* tileOf(uint32_t column, uint32_t row) const {

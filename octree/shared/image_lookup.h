@@ -2,11 +2,11 @@
 // float), as C++ in float and double (octree/surface/image_lookup.h), after leaf_math.h, and, from the line that says
 // so, for several pixels at once (render/host/tile_colours.cpp). Only the common subset of GLSL and GLM is used, and
 // SELECT(condition, yes, no), both of which are computed.
-
-#ifndef FOR_LANES
 //
 // A pixel's footprint is an ellipse on the surface, and in the image. It is filtered at several places along it, each
 // from the two levels whose texels are as wide as it is (McCormack et al. 1999, "Feline"; Williams 1983).
+
+#ifndef FOR_LANES
 
 // Word of a page's header with the number of its vertices: behind their colours stand their points.
 const uint kPageHeaderVertices = 6u;

@@ -24,7 +24,7 @@ struct HitSurface {
     glm::vec4 colour;
 };
 
-/// Returns the colour alone of such a hit, without regard to images (hit_colours.h).
+/// Returns the colour alone of such a hit, without regard to images (tile_colours.h).
 glm::vec4 colourAt(const HostScene& scene, const TileHits& hits, int pixel);
 
 /// `pixel`: element of the arrays of `hits` at which there is a hit; `direction`: of its ray, of any length.

@@ -55,6 +55,13 @@ void ImageResidency::learn(uint64_t page, std::vector<ImageNeed> needs) {
     for (const ImageNeed& need : needs) shown.push_back(shownOf(need));
 }
 
+void ImageResidency::forgetOthers(const std::vector<uint64_t>& pages) {
+    std::unordered_map<uint64_t, std::vector<Shown>> kept;
+    for (const uint64_t page : pages)
+        if (auto found = pages_.extract(page)) kept.insert(std::move(found));
+    pages_ = std::move(kept);
+}
+
 void ImageResidency::look(const Dataset& dataset, const SelectionView& view, const std::vector<uint64_t>& cut,
                           ViewNumber number) {
     Look& look = looks_[number];
@@ -152,7 +159,8 @@ void ImageResidency::leaveOut() {
     }
 }
 
-/// Drops pieces that are not planned until the others have room.
+/// Drops pieces that are not planned where the others have no room: some more than must go, so that the next ones can
+/// come without.
 void ImageResidency::makeRoom() {
     uint64_t bytes = 0;
     std::vector<uint64_t> others;
@@ -163,7 +171,8 @@ void ImageResidency::makeRoom() {
     // Pieces of one plan go with their highest numbers first, since finer levels have these.
     std::sort(others.begin(), others.end(),
               [&](uint64_t a, uint64_t b) { return needed_[a] != needed_[b] ? needed_[a] < needed_[b] : a > b; });
-    for (auto piece = others.begin(); piece != others.end() && bytes > mostBytes_; ++piece) {
+    const uint64_t kept = bytes > mostBytes_ ? mostBytes_ - mostBytes_ / 8 : mostBytes_;
+    for (auto piece = others.begin(); piece != others.end() && bytes > kept; ++piece) {
         assembly_.drop(*piece);
         bytes -= bytes_[*piece];
         dropped_ = dropped_ || shownPieces_[*piece];

@@ -32,6 +32,10 @@ public:
 
     /// Remembers what a page needs.
     void learn(uint64_t page, std::vector<ImageNeed> needs);
+    /// How many pages are remembered.
+    [[nodiscard]] size_t pagesKnown() const { return pages_.size(); }
+    /// Forgets all pages but these.
+    void forgetOthers(const std::vector<uint64_t>& pages);
     /// Says which pages a view draws. Precondition: needs of those that have any were learnt.
     void look(const Dataset& dataset, const SelectionView& view, const std::vector<uint64_t>& cut,
               ViewNumber number = 0);

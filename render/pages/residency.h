@@ -70,7 +70,7 @@ public:
     /// Returns the slot of a page that is resident.
     [[nodiscard]] PoolSlot slotOf(uint64_t page) const;
     [[nodiscard]] bool hasColour() const { return dataset_.withColour; }
-    /// The levels of the file's images to draw from, the same until the scene's next update; null: the colours of
+    /// The tiles of the file's images to draw from, the same until the scene's next update; null: the colours of
     /// vertices are shown.
     [[nodiscard]] std::shared_ptr<const ImageSet> images() const { return images_ ? images_->shown() : nullptr; }
     /// The pieces of the images that the view needs on some of its pages. Precondition: images() is not null.
@@ -79,7 +79,7 @@ public:
     }
     /// Precondition: images() is not null.
     [[nodiscard]] const ImagePieces& pieces() const { return images_->pieces(); }
-    /// Counts the sets of levels.
+    /// Counts the sets of tiles.
     [[nodiscard]] uint64_t imagesVersion() const { return images_ ? images_->version() : 0; }
     /// The most bytes that these take.
     [[nodiscard]] uint64_t mostImageBytes() const { return images_ ? images_->mostBytes() : 0; }
@@ -110,6 +110,7 @@ private:
     const size_t number_;
     const PooledDataset dataset_;
     std::unique_ptr<ImageResidency> images_;
+    size_t pagesKept_ = 0;  // once `images_` knows so many pages, it forgets those that were evicted
     std::map<ViewNumber, ViewCut> cuts_;
     uint64_t cutsDrawn_ = 0;  // number of the last cut
 };

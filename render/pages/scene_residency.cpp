@@ -193,11 +193,21 @@ void SceneResidency::giveUp(const Loaded& failed) {
     if (failed.bytes.error().code == ErrorCode::Limit) tooLarge_.push_back(request);
 }
 
+/// Forgets what evicted pages show of images, once these are more than the others; pages that come are learnt anew.
+void SceneResidency::forgetEvicted(Residency& dataset) {
+    constexpr size_t kFew = 256;
+    if (dataset.images_->pagesKnown() < dataset.pagesKept_) return;
+    const std::vector<uint64_t> resident = dataset.residentPages();
+    dataset.images_->forgetOthers(resident);
+    dataset.pagesKept_ = 2 * resident.size() + kFew;
+}
+
 std::vector<Wish> SceneResidency::imageWishes(std::span<const std::optional<SelectionView>> views,
                                               std::span<const DrawableCut> cuts, ViewNumber number) {
     std::vector<Wish> wishes;
     for (Residency& each : datasets_) {
         if (!each.images_) continue;
+        forgetEvicted(each);
         if (const auto& view = views[each.number()])
             each.images_->look(each.dataset(), *view, cuts[each.number()].cut, number);
         else

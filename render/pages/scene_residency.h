@@ -92,6 +92,7 @@ private:
     Result<void> place(uint64_t page, const PageBytes& bytes);
     void giveUp(const Loaded& failed);
     /// Tells the images what a view draws, and returns the pieces of them to read.
+    void forgetEvicted(Residency& dataset);
     std::vector<Wish> imageWishes(std::span<const std::optional<SelectionView>> views,
                                   std::span<const DrawableCut> cuts, ViewNumber number);
     /// The error of a pool of so many bytes without room for the coarsest pages.

@@ -8,8 +8,8 @@ namespace vcp {
 
 namespace {
 
-// What the tables of images may take beside their texels.
-constexpr uint64_t kTableBytes = 1ull << 20;
+// What the tables of images may take beside their texels: those of a million tiles.
+constexpr uint64_t kTableBytes = 4ull << 20;
 
 /// Where the words of images stand: those that all sets of a file share, which the texels follow.
 struct Layout {

@@ -109,11 +109,12 @@ vec4 bilinearLight(uvec4 level, ImagedTriangle t, vec2 at, float weight, out boo
            weightedTexel(texelOf(level, tiles.w, high), weight * f.y * f.x);
 }
 
-// Returns what a level shows, or the next coarser one that is here; the coarsest is. `level`: word of its record.
-vec4 levelLight(uint level, ImagedTriangle t, vec2 at, float weight) {
+// Returns what a level shows, or the next coarser one that is here; the coarsest is. `level`: word of its record;
+// `end`: after those of the image.
+vec4 levelLight(uint level, uint end, ImagedTriangle t, vec2 at, float weight) {
     bool isHere = false;
     vec4 light = vec4(0.0);
-    DONT_UNROLL for (; !isHere; level += 4u) light = bilinearLight(imageRecord(level), t, at, weight, isHere);
+    DONT_UNROLL for (; !isHere && level < end; level += 4u) light = bilinearLight(imageRecord(level), t, at, weight, isHere);
     return light;
 }
 
@@ -122,13 +123,13 @@ vec4 imageColour(ImagedTriangle t, vec2 at, TextureSlope slope, vec3 n, vec3 dir
     uvec4 image = imageRecord(t.image);
     ImageFootprint footprint = imageFootprint(slope, n, direction, pixelEdge, vec2(image.xy));
     ImagePlaces places = imagePlaces(footprint, float(image.z), float(image.w - 1u));
-    uint finer = t.image + 4u + 4u * uint(places.level);
+    uint finer = t.image + 4u + 4u * uint(places.level), end = t.image + 4u + 4u * image.w;
     float part = 1.0 / places.count, coarser = fract(places.level);
     vec4 sum = vec4(0.0);
     DONT_UNROLL for (int i = 0; i < int(places.count); i++) {
         vec2 place = at + ((float(i) + 0.5) * part - 0.5) * places.along;
-        sum += levelLight(finer, t, place, (1.0 - coarser) * part);
-        if (coarser > 0.0) sum += levelLight(finer + 4u, t, place, coarser * part);
+        sum += levelLight(finer, end, t, place, (1.0 - coarser) * part);
+        if (coarser > 0.0) sum += levelLight(finer + 4u, end, t, place, coarser * part);
     }
     // What is transparent lends no colour.
     if (!(sum.w > 0.0)) return vec4(0.0);

@@ -49,10 +49,21 @@ Result<Dataset> checkBytes(const ByteReader& reader, ProgressStyle style) {
     return dataset;
 }
 
+/// Reads the images of a file; none of those that take too much memory, with a warning.
 Result<ImageSet> imagesOf(const std::filesystem::path& path, const Dataset& dataset) {
+    constexpr uint64_t kMostBytes = uint64_t{4} << 30;
     if (!dataset.hasImages()) return ImageSet();
     VCP_TRY_ASSIGN(const auto file, openFile(path));
-    return readAllImages(*file, dataset.header.images);
+    VCP_TRY_ASSIGN(const auto pieces, ImagePieces::read(*file, dataset.header.images));
+    uint64_t bytes = 0;
+    for (uint64_t piece = 0; piece < pieces->count(); ++piece)
+        bytes += pieces->texelsOf(pieces->piece(piece)) * sizeof(uint32_t);
+    if (bytes <= kMostBytes) return readAllImages(*file, dataset.header.images);
+    warnOnTerminal(
+        fmt::format("{}: its images take {} MiB, and colours are compared where they take {} at most; the "
+                    "colours of vertices are compared",
+                    path.string(), bytes >> 20, kMostBytes >> 20));
+    return ImageSet();
 }
 
 Result<SurfaceDistance> measure(const VerifyCommand& command) {
