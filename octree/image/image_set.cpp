@@ -14,8 +14,8 @@ ImageSet::Level::Level(const ImageLevel& level)
 
 ImageSet::ImageSet(const ImageTables& tables) : materials_(tables.materials) {
     for (const ImageRow& row : tables.images) {
-        Image& image = images_.emplace_back(row.width, row.height, row.levels);
-        for (const ImageLevel& level : levelsOf(row)) image.levels.emplace_back(level);
+        images_.push_back({row.width, row.height, row.levels, {}});
+        for (const ImageLevel& level : levelsOf(row)) images_.back().levels.emplace_back(level);
     }
 }
 

@@ -37,7 +37,8 @@ ImageCopies::ImageCopies(const ImageTables& tables) : without_(tables) {
 }
 
 const ImageCopies::Level& ImageCopies::levelOf(uint32_t number) const {
-    return *(std::ranges::upper_bound(levels_, number, {}, &Level::first) - 1);
+    const auto isAfter = [](uint32_t tile, const Level& level) { return tile < level.first; };
+    return *(std::upper_bound(levels_.begin(), levels_.end(), number, isAfter) - 1);
 }
 
 std::byte* ImageCopies::room(uint32_t number) {
