@@ -19,7 +19,7 @@ namespace {
 
 using test::bigEndian, test::jpegOf, test::JpegKind, test::pngChunk, test::pngFile;
 
-Image noise(uint32_t width, uint32_t height, unsigned seed, Rgba8 alpha = 0xFF000000) {
+Image noisyImage(uint32_t width, uint32_t height, unsigned seed, Rgba8 alpha = 0xFF000000) {
     std::mt19937 random(seed);
     Image image{width, height, {}};
     for (uint32_t i = 0; i < width * height; ++i) image.texels.push_back(Rgba8(random()) | alpha);
@@ -254,7 +254,7 @@ TEST(LevelBands, AreTheLevelsOfTheWholeImage) {
                                                                                   {300, 513},
                                                                                   {5, 4099}}) {
         SCOPED_TRACE(testing::Message() << width << " by " << height);
-        const Image image = noise(width, height, width + height, 0x40000000);
+        const Image image = noisyImage(width, height, width + height, 0x40000000);
         RowsInMemory rows(image);
         const auto levels = levelsOf(rows);
         const Texture whole(image);
@@ -277,7 +277,7 @@ TEST(LevelBands, AreTheLevelsOfTheWholeImage) {
 }
 
 TEST(LevelBands, PassOnWhatIsWrong) {
-    const std::string file = jpegOf(noise(300, 900, 1));
+    const std::string file = jpegOf(noisyImage(300, 900, 1));
     const auto cut = ImageRows::open(randomBytesAt(std::string_view(file).substr(0, file.size() / 2)));
     ASSERT_TRUE(cut.ok());
     size_t rows = 0;
@@ -288,7 +288,7 @@ TEST(LevelBands, PassOnWhatIsWrong) {
     ASSERT_FALSE(read.ok());
     EXPECT_EQ(read.error().code, ErrorCode::InvalidInput);
     EXPECT_EQ(rows, 1u) << "of four";
-    const Image image = noise(40, 900, 2);
+    const Image image = noisyImage(40, 900, 2);
     RowsInMemory whole(image);
     const auto stopped = readLevels(whole, [&](size_t level, uint32_t firstRow, std::span<const Rgba8>) {
         return level == 1 && firstRow == 256 ? Error::cancelled() : Result<void>();
@@ -308,7 +308,7 @@ TEST(LevelBands, TexturesOfHugeImagesBeginWithACoarserLevel) {
     EXPECT_EQ(texture->bytes(), Texture::bytesOf({16384, 1026}));
     EXPECT_EQ(texture->sample({0.3f, 0.7f}, {}), 0xFF306090u);
 
-    const Image small = noise(300, 700, 9);
+    const Image small = noisyImage(300, 700, 9);
     RowsInMemory smallRows(small);
     const auto kept = Texture::read(smallRows);
     const Texture whole(small);
@@ -321,7 +321,7 @@ TEST(LevelBands, TexturesOfHugeImagesBeginWithACoarserLevel) {
 // Many textures take what the cache may have, not what they have together.
 TEST(TextureCache, StaysWithinItsMemory) {
     std::vector<Material> materials(50);
-    const auto file = std::make_shared<const std::string>(jpegOf(noise(512, 512, 1), {.quality = 50}));
+    const auto file = std::make_shared<const std::string>(jpegOf(noisyImage(512, 512, 1), {.quality = 50}));
     for (Material& material : materials) material.image.bytes = file;
     constexpr uint64_t kMemory = uint64_t{8} << 20;
     TextureCache cache(kMemory);
