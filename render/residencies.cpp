@@ -76,10 +76,7 @@ Result<DatasetImages> findImages(std::span<const PlacedDataset> datasets, bool w
     for (size_t i = 0; i < datasets.size(); ++i) {
         if (!withColour || !datasets[i].dataset->hasImages()) continue;
         VCP_TRY_ASSIGN(found.pieces[i], datasets[i].source->images());
-        if (!found.pieces[i]) continue;
-        for (uint32_t image = 0; image < found.pieces[i]->tables().images.size(); ++image)
-            for (const ImageLevel& level : found.pieces[i]->levelsOf(image))
-                found.mostBytes[i] += level.texels() * sizeof(uint32_t);
+        if (found.pieces[i]) found.mostBytes[i] = found.pieces[i]->bytes();
     }
     const double share = double(mostBytes) / double(std::max<uint64_t>(found.bytes(), 1));
     if (share < 1)

@@ -1,6 +1,7 @@
 #include "octree/image/image_assembly.h"
 
 #include <algorithm>
+#include <utility>
 
 namespace vcp {
 
@@ -28,14 +29,18 @@ void ImageAssembly::drop(uint64_t number) {
     }
 }
 
-Result<ImageSet> readAllImages(const ByteReader& reader, const ImagesPlace& place) {
-    VCP_TRY_ASSIGN(const auto pieces, ImagePieces::read(reader, place));
-    ImageAssembly assembly(pieces);
-    for (uint64_t piece = 0; piece < pieces->count(); ++piece) {
-        VCP_TRY_ASSIGN(const auto texels, pieces->readPiece(reader, piece));
+Result<ImageSet> readAllImages(const ByteReader& reader, std::shared_ptr<const ImagePieces> pieces) {
+    ImageAssembly assembly(std::move(pieces));
+    for (uint64_t piece = 0; piece < assembly.pieces().count(); ++piece) {
+        VCP_TRY_ASSIGN(const auto texels, assembly.pieces().readPiece(reader, piece));
         assembly.take(piece, texels);
     }
     return assembly.set();
+}
+
+Result<ImageSet> readAllImages(const ByteReader& reader, const ImagesPlace& place) {
+    VCP_TRY_ASSIGN(auto pieces, ImagePieces::read(reader, place));
+    return readAllImages(reader, std::move(pieces));
 }
 
 }  // namespace vcp

@@ -32,7 +32,9 @@ private:
     std::vector<bool> has_;
 };
 
-/// Reads all pieces of a file whose place was checked. Errors: those of ImagePieces.
+/// Reads all pieces of a file. Errors: those of ImagePieces.
+Result<ImageSet> readAllImages(const ByteReader& reader, std::shared_ptr<const ImagePieces> pieces);
+/// The same, and its tables before. Precondition: the place was checked.
 Result<ImageSet> readAllImages(const ByteReader& reader, const ImagesPlace& place);
 
 }  // namespace vcp

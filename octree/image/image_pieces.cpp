@@ -94,6 +94,13 @@ uint64_t ImagePieces::texelsOf(const ImagePiece& piece) const {
     return texels;
 }
 
+uint64_t ImagePieces::bytes() const {
+    uint64_t bytes = 0;
+    for (const std::vector<ImageLevel>& levels : levels_)
+        for (const ImageLevel& level : levels) bytes += level.texels() * sizeof(uint32_t);
+    return bytes;
+}
+
 ImagePieces::Extent ImagePieces::extentOf(const ImagePiece& piece) const {
     const TileRow& last = tables_.tiles[piece.firstTile + piece.tiles - 1];
     return {tables_.tiles[piece.firstTile].offset, last.offset + last.storedBytes};

@@ -50,6 +50,9 @@ public:
     [[nodiscard]] uint64_t pieceOf(uint32_t image, uint32_t level, glm::uvec2 tile) const;
     /// Returns the texels of its tiles.
     [[nodiscard]] uint64_t texelsOf(const ImagePiece& piece) const;
+    /// Returns the bytes that a piece takes in memory, and those of all.
+    [[nodiscard]] uint64_t bytesOf(uint64_t number) const { return texelsOf(piece(number)) * sizeof(uint32_t); }
+    [[nodiscard]] uint64_t bytes() const;
     /// Where a piece is in the file; pieces follow each other.
     struct Extent {
         uint64_t begin = 0, end = 0;

@@ -20,8 +20,9 @@ ImageSet::ImageSet(const ImageTables& tables) : materials_(tables.materials) {
 }
 
 uint64_t ImageSet::Level::texelsOf(size_t i) const {
-    const uint32_t edge = 1u << log2Edge, x = uint32_t(i % tilesX) * edge, y = uint32_t(i / tilesX) * edge;
-    return uint64_t{std::min(edge, width - x)} * std::min(edge, height - y);
+    const ImageLevel level{width, height, 0, 1u << log2Edge};
+    const glm::uvec2 size = level.sizeOf({i % tilesX, i / tilesX});
+    return uint64_t{size.x} * size.y;
 }
 
 void ImageSet::set(uint32_t number, uint32_t level, glm::uvec2 tile, Tile texels) {

@@ -12,6 +12,8 @@
 #include <bit>
 #include <cstdint>
 
+#include <glm/vec3.hpp>
+
 HWY_BEFORE_NAMESPACE();
 namespace vcp::HWY_NAMESPACE {
 
@@ -97,6 +99,8 @@ struct Lane4 {
     Lane4() = default;
     HWY_INLINE Lane4(Lane a, Lane b, Lane c, Lane d) : x(a), y(b), z(c), w(d) {}
 };
+HWY_INLINE Lane3 spread(glm::dvec3 v) { return {Lane(float(v.x)), Lane(float(v.y)), Lane(float(v.z))}; }
+HWY_INLINE Lane3 spread(glm::vec3 v) { return {Lane(v.x), Lane(v.y), Lane(v.z)}; }
 HWY_INLINE Lane2 operator+(Lane2 a, Lane2 b) { return {a.x + b.x, a.y + b.y}; }
 HWY_INLINE Lane2 operator*(Lane2 a, Lane2 b) { return {a.x * b.x, a.y * b.y}; }
 HWY_INLINE Lane2 operator*(Lane a, Lane2 b) { return {a * b.x, a * b.y}; }

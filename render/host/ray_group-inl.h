@@ -45,9 +45,6 @@ HWY_INLINE Lane invert(Lane& x) {
     return Lane(1.0f) / x;
 }
 
-HWY_INLINE Lane3 spread(glm::dvec3 v) { return {Lane(float(v.x)), Lane(float(v.y)), Lane(float(v.z))}; }
-HWY_INLINE Lane3 spread(glm::vec3 v) { return {Lane(v.x), Lane(v.y), Lane(v.z)}; }
-
 HWY_INLINE void setInverse(RayGroup& group) {
     group.inverse.x = invert(group.direction.x);
     group.inverse.y = invert(group.direction.y);

@@ -223,7 +223,6 @@ void filterHere(const PictureRays& rays, const PixelEdges& edges, const TileHits
     const ColourTables& tables = ColourTables::get();
     const glm::vec3 first(rays.directionAt(hits.corner.x + 0.5, hits.corner.y + 0.5)), perX(rays.directionPerX),
         perY(rays.directionPerY);
-    const auto spread = [](glm::vec3 v) { return Lane3(Lane(v.x), Lane(v.y), Lane(v.z)); };
     for (size_t k = 0; k < pixels.count; k += kLanes) {
         const LaneWords pixel = hn::Load(Words(), pixels.pixel + k);
         const LeafNumbers leaf(leaves, hn::Load(Words(), pixels.leaf + k));

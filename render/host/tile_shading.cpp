@@ -35,8 +35,6 @@ HWY_INLINE Lane pow(Lane x, Lane y) {
 #undef Real
 #undef Real3
 
-HWY_INLINE Lane3 spread(glm::vec3 v) { return {Lane(v.x), Lane(v.y), Lane(v.z)}; }
-
 /// Makes a vector unit; 0 stays near 0.
 HWY_INLINE Lane3 normalized(Lane3 v) { return (Lane(1.0f) / sqrt(max(dot(v, v), Lane(1e-30f)))) * v; }
 

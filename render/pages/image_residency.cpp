@@ -35,7 +35,7 @@ ImageResidency::ImageResidency(std::shared_ptr<const ImagePieces> pieces, uint64
       shown_(std::make_shared<const ImageSet>(assembly_.set())),
       shownPieces_(this->pieces().count()) {
     for (uint64_t piece = 0; piece < planned_.size(); ++piece)
-        bytes_.push_back(uint32_t(this->pieces().texelsOf(this->pieces().piece(piece)) * sizeof(uint32_t)));
+        bytes_.push_back(uint32_t(this->pieces().bytesOf(piece)));
 }
 
 ImageResidency::Shown ImageResidency::shownOf(const ImageNeed& need) const {

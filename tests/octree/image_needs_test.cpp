@@ -44,6 +44,22 @@ protected:
         for (uint32_t i = 0; i < page.header.vertices; ++i) points.push_back({any(), any(), material});
         return points;
     }
+    /// A sheet whose vertices have such places, in material 1.
+    struct Placed {
+        Placed(const test::SoupPage& sheet, double middle, double reach) : whole(test::SoupPage(sheet).build(1)) {
+            place(middle, reach);
+        }
+        void place(double middle, double reach) {
+            places = points(whole.view(), 1, middle, reach, random);
+            page = whole.view();
+            page.points = places;
+        }
+
+        test::WholePage whole;
+        std::mt19937 random{1};
+        std::vector<TexturePoint> places;
+        PageView page{};
+    };
     [[nodiscard]] ImageSet setOf(const std::vector<bool>& has) const {
         ImageAssembly assembly(pieces_);
         for (uint64_t piece = 0; piece < has.size(); ++piece)
@@ -124,32 +140,24 @@ TEST_F(ImageNeeds, WhatIsNotThereIsSeenInACoarserLevel) {
 }
 
 TEST_F(ImageNeeds, OfASmallPartAreSmall) {
-    const test::WholePage whole = test::sheet(1, 2, 3, 5).build(1);
-    std::mt19937 random(1);
-    PageView page = whole.view();
-    const auto places = points(page, 1, 0.3, 0.001, random);
-    page.points = places;
+    Placed sheet(test::sheet(1, 2, 3, 5), 0.3, 0.001);
     // 1900 texels are 16 blocks across, of which four may meet there.
     EXPECT_EQ(blocksAcross(pieces_->tables().images[0]), 16u);
-    for (const ImageNeed& need : imageNeeds(pieces_->tables(), page)) {
+    for (const ImageNeed& need : imageNeeds(pieces_->tables(), sheet.page)) {
         EXPECT_LE(need.blocks.size(), 4u);
         EXPECT_LE(piecesNeeded(*pieces_, need, 0).size(), 2u);
     }
     // Twice around is all of it.
-    const auto around = points(page, 1, 0, 1.2, random);
-    page.points = around;
+    sheet.place(0, 1.2);
     std::set<uint16_t> all;
-    for (const ImageNeed& need : imageNeeds(pieces_->tables(), page))
+    for (const ImageNeed& need : imageNeeds(pieces_->tables(), sheet.page))
         all.insert(need.blocks.begin(), need.blocks.end());
     EXPECT_EQ(all.size(), 256u);
 }
 
 TEST_F(ImageNeeds, EachTriangleIsInOneAsWideAndAsFine) {
-    const test::WholePage whole = test::sheet(3, 3, 3, 12).build(1);
-    std::mt19937 random(2);
-    PageView page = whole.view();
-    const auto places = points(page, 1, 0.5, 0.3, random);
-    page.points = places;
+    const Placed sheet(test::sheet(3, 3, 3, 12), 0.5, 0.3);
+    const PageView& page = sheet.page;
     const auto needs = imageNeeds(pieces_->tables(), page);
     EXPECT_GT(needs.size(), 4u);
     forEachTriangle(page, [&](const Index3& corners) {

@@ -55,14 +55,11 @@ Result<ImageSet> imagesOf(const std::filesystem::path& path, const Dataset& data
     if (!dataset.hasImages()) return ImageSet();
     VCP_TRY_ASSIGN(const auto file, openFile(path));
     VCP_TRY_ASSIGN(const auto pieces, ImagePieces::read(*file, dataset.header.images));
-    uint64_t bytes = 0;
-    for (uint64_t piece = 0; piece < pieces->count(); ++piece)
-        bytes += pieces->texelsOf(pieces->piece(piece)) * sizeof(uint32_t);
-    if (bytes <= kMostBytes) return readAllImages(*file, dataset.header.images);
+    if (pieces->bytes() <= kMostBytes) return readAllImages(*file, pieces);
     warnOnTerminal(
         fmt::format("{}: its images take {} MiB, and colours are compared where they take {} at most; the "
                     "colours of vertices are compared",
-                    path.string(), bytes >> 20, kMostBytes >> 20));
+                    path.string(), pieces->bytes() >> 20, kMostBytes >> 20));
     return ImageSet();
 }
 

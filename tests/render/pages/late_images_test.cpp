@@ -87,7 +87,7 @@ TEST_F(LateImagesTest, APartOfTheViewReadsWhatItsPagesShow) {
     uint64_t bytes = 0;
     const std::vector<bool> needed = residency.neededOn(view, residency.cut());
     for (uint64_t piece = 0; piece < needed.size(); ++piece)
-        if (needed[piece]) bytes += residency.pieces().texelsOf(residency.pieces().piece(piece)) * sizeof(uint32_t);
+        if (needed[piece]) bytes += residency.pieces().bytesOf(piece);
     EXPECT_EQ(bytes, residency.images()->bytes());
     EXPECT_GT(bytes, 0u);
     const std::vector<bool> without = residency.neededOn(view, {});
