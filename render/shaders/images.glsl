@@ -99,8 +99,8 @@ vec4 bilinearLight(uvec4 level, ImagedTriangle t, vec2 at, float weight, out boo
     uint first = tileOf(level, low);
     uvec4 tiles = uvec4(first);
     if (low >> int(level.w) != high >> int(level.w))
-        tiles = uvec4(first, tileOf(level, ivec2(high.x, low.y)), tileOf(level, ivec2(low.x, high.y)),
-                      tileOf(level, high));
+        tiles =
+            uvec4(first, tileOf(level, ivec2(high.x, low.y)), tileOf(level, ivec2(low.x, high.y)), tileOf(level, high));
     isHere = all(notEqual(tiles, uvec4(0u)));
     if (!isHere) return vec4(0.0);
     return weightedTexel(texelOf(level, tiles.x, low), weight * (1.0 - f.y) * (1.0 - f.x)) +
@@ -114,7 +114,10 @@ vec4 bilinearLight(uvec4 level, ImagedTriangle t, vec2 at, float weight, out boo
 vec4 levelLight(uint level, uint end, ImagedTriangle t, vec2 at, float weight) {
     bool isHere = false;
     vec4 light = vec4(0.0);
-    DONT_UNROLL for (; !isHere && level < end; level += 4u) light = bilinearLight(imageRecord(level), t, at, weight, isHere);
+    DONT_UNROLL
+    for (; !isHere && level < end; level += 4u) {
+        light = bilinearLight(imageRecord(level), t, at, weight, isHere);
+    }
     return light;
 }
 
