@@ -169,12 +169,13 @@ std::vector<ImageNeed> imageNeeds(const ImageTables& tables, const PageView& pag
     return needs;
 }
 
-uint32_t finestNeeded(float texelsPerCell, double pixelEdge, uint32_t levels) {
+double levelNeeded(float texelsPerCell, double pixelEdge, uint32_t levels) {
     // Single precision may find a footprint a little shorter.
     constexpr double kRounding = 0.999;
+    // Where a pixel is narrower, by how much does not matter.
+    constexpr double kFewestTexels = 0x1p-16;
     const double texels = double(texelsPerCell) * pixelEdge * double(f32::kFootprintPixels) * kRounding;
-    if (!(texels > 1)) return 0;
-    return uint32_t(std::min(std::floor(std::log2(texels)), double(levels - 1)));
+    return std::min(std::log2(texels > kFewestTexels ? texels : kFewestTexels), double(levels - 1));
 }
 
 uint32_t blocksAcross(const ImageRow& image) {

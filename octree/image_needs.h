@@ -14,9 +14,10 @@ namespace vcp {
 /// triangles that are near each other and show it about as finely. Materials that there are not count for none.
 std::vector<ImageNeed> imageNeeds(const ImageTables& tables, const PageView& page);
 
-/// Returns the finest level that a need asks for where pixels are so wide, cells of the page: no footprint of a pixel
-/// there (octree/shared/image_lookup.h) reads a finer one.
-uint32_t finestNeeded(float texelsPerCell, double pixelEdge, uint32_t levels);
+/// Returns the level, with its fraction, that a need asks for where pixels are so wide, cells of the page: no footprint
+/// of a pixel there (octree/shared/image_lookup.h) reads a finer one than its whole part, nor where it is below 0, one
+/// than the finest.
+double levelNeeded(float texelsPerCell, double pixelEdge, uint32_t levels);
 
 /// Returns into how many blocks an image is divided along both axes: along the longer one they are kFirstEdge texels or
 /// more.

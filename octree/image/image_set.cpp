@@ -40,4 +40,14 @@ void ImageSet::set(uint32_t number, uint32_t level, glm::uvec2 tile, Tile texels
         while (image.finest < image.levels.size() && image.levels[image.finest].there == 0) ++image.finest;
 }
 
+void ImageSet::shrinkTo(uint64_t mostBytes) {
+    for (uint32_t level = 0; bytes_ > mostBytes; ++level)
+        for (uint32_t image = 0; image < images_.size(); ++image) {
+            if (level >= images_[image].levels.size()) continue;
+            const Level& of = images_[image].levels[level];
+            for (uint32_t tile = 0; tile < of.tiles.size() && bytes_ > mostBytes; ++tile)
+                set(image, level, {tile % of.tilesX, tile / of.tilesX}, nullptr);
+        }
+}
+
 }  // namespace vcp

@@ -59,6 +59,8 @@ public:
 
     /// Puts a tile in its place, or takes it away (null). `tile`: its column and row.
     void set(uint32_t image, uint32_t level, glm::uvec2 tile, Tile texels);
+    /// Takes tiles away until the others take so many bytes at most: of all images the finest first.
+    void shrinkTo(uint64_t mostBytes);
 
 private:
     std::vector<Image> images_;

@@ -17,6 +17,8 @@ namespace {
 constexpr int kUrgentLevels = 6;
 /// How many levels of an image are read at once.
 constexpr uint32_t kLevelsAhead = 3;
+/// How many steps of a level tell apart what is needed more where not all has room.
+constexpr float kNeedSteps = 4;
 
 /// Returns the edge of a pixel at the point of a box nearest to the eye.
 double pixelEdgeAt(glm::dvec3 low, glm::dvec3 high, const SelectionView& view) {
@@ -65,14 +67,14 @@ void ImageResidency::forgetOthers(const std::vector<uint64_t>& pages) {
 void ImageResidency::look(const Dataset& dataset, const SelectionView& view, const std::vector<uint64_t>& cut,
                           ViewNumber number) {
     Look& look = looks_[number];
-    if (look.view == view && look.cut == cut && !look.needed.empty()) return;
-    look = {view, cut, neededOn(dataset, view, cut)};
+    if (look.view == view && look.cut == cut && !look.needs.empty()) return;
+    look = {view, cut, needsOn(dataset, view, cut)};
     replan();
 }
 
-std::vector<bool> ImageResidency::neededOn(const Dataset& dataset, const SelectionView& view,
+std::vector<float> ImageResidency::needsOn(const Dataset& dataset, const SelectionView& view,
                                            const std::vector<uint64_t>& pages) const {
-    std::vector<bool> needed(pieces().count());
+    std::vector<float> needs(pieces().count());
     for (const uint64_t page : pages) {
         const auto shown = pages_.find(page);
         if (shown == pages_.end() || !inFrustum(dataset, dataset.pages[page], view)) continue;
@@ -81,13 +83,23 @@ std::vector<bool> ImageResidency::neededOn(const Dataset& dataset, const Selecti
         for (const Shown& of : shown->second) {
             const glm::dvec3 low = origin + cell * glm::dvec3(of.low), high = origin + cell * glm::dvec3(of.high);
             if (!inFrustum(low, high, view)) continue;
-            const uint32_t finest = finestNeeded(of.texelsPerCell, pixelEdgeAt(low, high, view) / cell,
-                                                 uint32_t(pieces().levelsOf(of.image).size()));
-            const uint32_t begin = of.begin[std::min(size_t{finest}, of.begin.size() - 1)];
-            for (size_t i = begin; i < of.pieces.size(); ++i) needed[of.pieces[i]] = true;
+            addNeeds(of, pixelEdgeAt(low, high, view) / cell, needs);
         }
     }
-    return needed;
+    return needs;
+}
+
+/// Adds what a part of a page needs where pixels are so wide, cells of the page.
+void ImageResidency::addNeeds(const Shown& shown, double pixelEdge, std::vector<float>& needs) const {
+    const auto levels = uint32_t(pieces().levelsOf(shown.image).size());
+    const double needed = levelNeeded(shown.texelsPerCell, pixelEdge, levels);
+    for (size_t level = 0; level < shown.begin.size(); ++level) {
+        const bool isFirst = level + 1 == shown.begin.size();  // with all that are coarser
+        const auto need = float((isFirst ? levels : double(level + 1)) - needed);
+        const size_t end = isFirst ? shown.pieces.size() : shown.begin[level + 1];
+        for (size_t i = shown.begin[level]; i < end; ++i)
+            needs[shown.pieces[i]] = std::max(needs[shown.pieces[i]], need);
+    }
 }
 
 void ImageResidency::forgetView(ViewNumber number) {
@@ -119,43 +131,34 @@ void ImageResidency::giveUp(uint64_t piece) {
 /// Chooses the pieces that are to be in memory, and drops those that have no room beside them.
 void ImageResidency::plan() {
     ++plans_;
-    std::fill(planned_.begin(), planned_.end(), false);
+    std::vector<float> needs(planned_.size());
+    for (const auto& [number, look] : looks_)
+        std::transform(needs.begin(), needs.end(), look.needs.begin(), needs.begin(),
+                       [](float a, float b) { return std::max(a, b); });
     for (uint64_t piece = 0; piece < planned_.size(); ++piece) {
-        for (const auto& [number, look] : looks_) planned_[piece] = planned_[piece] || look.needed[piece];
-        if (planned_[piece]) needed_[piece] = plans_;
-        planned_[piece] = planned_[piece] && !unreadable_[piece];
+        if (needs[piece] > 0) needed_[piece] = plans_;
+        planned_[piece] = needs[piece] > 0 && !unreadable_[piece];
     }
-    leaveOut();
+    leaveOut(needs);
     makeRoom();
 }
 
-/// Takes levels out of the plan until it is within what is allowed: again and again, of the finest that each image is
-/// planned to have, the one that takes the most.
-void ImageResidency::leaveOut() {
-    struct Planned {
-        uint32_t image, level;
-        uint64_t bytes;
-    };
-    std::vector<Planned> levels;  // image by image, the finest first
+/// Leaves the plan with what is needed the most and has room.
+void ImageResidency::leaveOut(const std::vector<float>& needs) {
     uint64_t bytes = 0;
-    for (uint32_t image = 0; image < pieces().tables().images.size(); ++image)
-        for (uint32_t level = 0; level <= pieces().firstLevel(image); ++level) {
-            const auto [first, end] = pieces().piecesOf(image, level);
-            uint64_t taken = 0;
-            for (uint64_t piece = first; piece < end; ++piece)
-                if (planned_[piece]) taken += bytes_[piece];
-            if (taken > 0) levels.push_back({image, level, taken});
-            bytes += taken;
-        }
-    while (bytes > mostBytes_) {
-        auto most = levels.begin();
-        for (auto level = levels.begin(); level != levels.end(); ++level)
-            if ((level == levels.begin() || level->image != (level - 1)->image) && level->bytes > most->bytes)
-                most = level;
-        const auto [first, end] = pieces().piecesOf(most->image, most->level);
-        std::fill(planned_.begin() + std::ptrdiff_t(first), planned_.begin() + std::ptrdiff_t(end), false);
-        bytes -= most->bytes;
-        levels.erase(most);
+    std::vector<std::pair<float, uint64_t>> order;
+    for (uint64_t piece = 0; piece < planned_.size(); ++piece) {
+        if (!planned_[piece]) continue;
+        bytes += bytes_[piece];
+        // What is needed about as much has an order of its own, which small moves do not change.
+        order.emplace_back(-std::floor(needs[piece] * kNeedSteps), piece);
+    }
+    if (bytes <= mostBytes_) return;
+    std::sort(order.begin(), order.end());
+    bytes = 0;
+    for (const auto& [step, piece] : order) {
+        bytes += bytes_[piece];
+        if (bytes > mostBytes_) planned_[piece] = false;
     }
 }
 
@@ -231,7 +234,7 @@ bool ImageResidency::isLimited(ViewNumber number) const {
     const auto look = looks_.find(number);
     if (look == looks_.end()) return false;
     for (uint64_t piece = 0; piece < planned_.size(); ++piece)
-        if (look->second.needed[piece] && !planned_[piece] && !unreadable_[piece]) return true;
+        if (look->second.needs[piece] > 0 && !planned_[piece] && !unreadable_[piece]) return true;
     return false;
 }
 
@@ -239,7 +242,7 @@ bool ImageResidency::isComplete(ViewNumber number) const {
     const auto look = looks_.find(number);
     if (look == looks_.end()) return true;
     for (uint64_t piece = 0; piece < planned_.size(); ++piece)
-        if (look->second.needed[piece] && planned_[piece] && !shownPieces_[piece]) return false;
+        if (look->second.needs[piece] > 0 && planned_[piece] && !shownPieces_[piece]) return false;
     return true;
 }
 

@@ -3,9 +3,9 @@
 //
 // A view needs of an image what its pages show of it, from the finest level on that a pixel can read there: from how
 // finely the page's triangles show the image, and where (octree/image_needs.h), and the point of the page's box that is
-// nearest to the eye. Images that no page shows need nothing. Where all that views need takes more than is allowed, the
-// finest levels of those that take the most are left out; what no view needs any more stays while there is room, and
-// what was needed last stays longest.
+// nearest to the eye. Images that no page shows need nothing. Where all that views need takes more than is allowed, all
+// images are a little coarser, by as much everywhere in the picture; what no view needs any more stays while there is
+// room, and what was needed last stays longest.
 //
 // What is drawn is a set, which changes by bounds: with the first piece, once half as many bytes came as there were,
 // when all came while the views stand still, and when some go. So for a still view, whoever copies each set copies at
@@ -39,8 +39,9 @@ public:
     /// Says which pages a view draws. Precondition: needs of those that have any were learnt.
     void look(const Dataset& dataset, const SelectionView& view, const std::vector<uint64_t>& cut,
               ViewNumber number = 0);
-    /// Returns which pieces a view needs on some of its pages.
-    [[nodiscard]] std::vector<bool> neededOn(const Dataset& dataset, const SelectionView& view,
+    /// Returns how much a view needs each piece on some of its pages: so many levels coarser could its images be, and
+    /// it would need the piece still; 0 where it does not.
+    [[nodiscard]] std::vector<float> needsOn(const Dataset& dataset, const SelectionView& view,
                                              const std::vector<uint64_t>& pages) const;
     /// The view does not show the dataset any more.
     void forgetView(ViewNumber number);
@@ -76,12 +77,13 @@ private:
     struct Look {
         SelectionView view;
         std::vector<uint64_t> cut;
-        std::vector<bool> needed;  // pieces
+        std::vector<float> needs;  // of pieces
     };
     [[nodiscard]] Shown shownOf(const ImageNeed& need) const;
+    void addNeeds(const Shown& shown, double pixelEdge, std::vector<float>& needs) const;
     void replan();
     void plan();
-    void leaveOut();
+    void leaveOut(const std::vector<float>& needs);
     void makeRoom();
     void addWishes(uint32_t image, std::vector<Wish>& wishes) const;
     void show();

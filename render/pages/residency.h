@@ -73,9 +73,10 @@ public:
     /// The tiles of the file's images to draw from, the same until the scene's next update; null: the colours of
     /// vertices are shown.
     [[nodiscard]] std::shared_ptr<const ImageSet> images() const { return images_ ? images_->shown() : nullptr; }
-    /// The pieces of the images that the view needs on some of its pages. Precondition: images() is not null.
-    [[nodiscard]] std::vector<bool> neededOn(const SelectionView& view, const std::vector<uint64_t>& pages) const {
-        return images_->neededOn(dataset(), view, pages);
+    /// How much the view needs each piece of the images on some of its pages (ImageResidency::needsOn). Precondition:
+    /// images() is not null.
+    [[nodiscard]] std::vector<float> needsOn(const SelectionView& view, const std::vector<uint64_t>& pages) const {
+        return images_->needsOn(dataset(), view, pages);
     }
     /// Precondition: images() is not null.
     [[nodiscard]] const ImagePieces& pieces() const { return images_->pieces(); }

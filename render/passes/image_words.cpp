@@ -62,10 +62,12 @@ uint64_t mostImageBytes(const Device& device) {
 }
 
 Result<Buffer> uploadImages(Device& device, const ImageSet& images) {
+    ImageSet within = images;
+    within.shrinkTo(mostImageBytes(device));
     std::vector<std::span<const std::byte>> parts(1);
-    const std::vector<uint32_t> tables = tableWords(images, parts);
+    const std::vector<uint32_t> tables = tableWords(within, parts);
     parts.front() = std::as_bytes(std::span(tables));
-    const uint64_t bytes = parts.front().size() + images.bytes(), most = device.limits().maxStorageBufferRange;
+    const uint64_t bytes = parts.front().size() + within.bytes(), most = device.limits().maxStorageBufferRange;
     if (bytes > most)
         return Error{
             .code = ErrorCode::Limit,

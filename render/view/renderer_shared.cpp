@@ -63,7 +63,9 @@ Result<void> Renderer::Shared::addDatasets(std::vector<PlacedDataset> placed) {
     if (placed.empty()) return showPool();
     RendererOptions left = options;
     VCP_TRY_ASSIGN(const auto beside, pageBudget(options.budgetBytes));
-    const uint64_t most = std::min({budgetOfImages(beside), options.ramBytes / 2, mostImageBytes(*device)});
+    uint64_t most = std::min(budgetOfImages(beside), options.ramBytes / 2);
+    // What the processor draws is not limited by what shaders address.
+    if (!options.hostRays || !info.software) most = std::min(most, mostImageBytes(*device));
     VCP_TRY_ASSIGN(auto found, findImages(placed, options.colour, most));
     VCP_TRY_ASSIGN(left.budgetBytes, budgetOfPages(beside, found.bytes()));
     VCP_TRY_ASSIGN(auto opened, openResidencies(poolsOf(*device, access), left, std::move(placed), std::move(found)));

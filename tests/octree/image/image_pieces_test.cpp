@@ -124,5 +124,23 @@ TEST_F(Pieces, GoAndComeAgain) {
     EXPECT_EQ(test::texelsOf(before.images()[0].levels[0]), images_[0].levels[0]) << "copies keep what they have";
 }
 
+TEST_F(Pieces, ShrinkBytesFinestFirst) {
+    const ImageSet all = *readAllImages(*file_, pieces_);
+    EXPECT_EQ(all.bytes(), pieces_->bytes());
+    for (uint64_t most = all.bytes() + 4; most > 0; most /= 3) {
+        ImageSet some = all;
+        some.shrinkTo(most);
+        EXPECT_LE(some.bytes(), most);
+        EXPECT_GT(some.bytes() + 4 * 256 * 256, std::min(most, all.bytes())) << "a tile more has no room";
+        uint32_t finest = 100, coarsest = 0;  // level that something is there of, and that lacks something
+        for (const ImageSet::Image& image : some.images())
+            for (uint32_t l = 0; l < image.levels.size(); ++l) {
+                if (image.levels[l].there > 0) finest = std::min(finest, l);
+                if (image.levels[l].there < image.levels[l].tiles.size()) coarsest = std::max(coarsest, l);
+            }
+        EXPECT_LE(coarsest, finest);
+    }
+}
+
 }  // namespace
 }  // namespace vcp

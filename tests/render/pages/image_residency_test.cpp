@@ -69,6 +69,13 @@ protected:
         return finest;
     }
 
+    /// Whether the first tile of a piece is shown.
+    [[nodiscard]] bool isThere(const ImageResidency& images, uint64_t number) const {
+        const ImagePiece piece = pieces_->piece(number);
+        const auto place = pieces_->placeOf(piece, 0);
+        const ImageSet::Level& level = images.shown()->images()[piece.image].levels[place.level];
+        return level.tiles[place.tile.y * level.tilesX + place.tile.x] != nullptr;
+    }
     /// How many tiles of a level are shown.
     [[nodiscard]] static int64_t tilesShown(const ImageResidency& images, uint32_t image, uint32_t level) {
         const auto& tiles = images.shown()->images()[image].levels[level].tiles;
@@ -147,15 +154,45 @@ TEST_F(ImageResidencyTest, MemoryGoesToWhatIsSeen) {
     EXPECT_FALSE(images.isLimited());
     EXPECT_EQ(finest(images), (std::vector<uint32_t>{0, 0, 9}));
     EXPECT_EQ(tilesShown(images, 0, 0), 128) << "half of the level had to go";
-    // Where all that is seen has no room, the largest levels are left out.
+    // Where all that is seen has no room, something of the finest levels is left out.
     images.learn(0, {need(0, 0.0f), need(1, 0.0f), need(2, 0.0f)});
     look(images, pixelsOf(1.02));
     settle(images);
     EXPECT_TRUE(images.isComplete());
     EXPECT_TRUE(images.isLimited());
-    EXPECT_EQ(finest(images), (std::vector<uint32_t>{0, 0, 0}));
-    EXPECT_EQ(tilesShown(images, 0, 0), 128) << "what is there and has room stays";
+    EXPECT_EQ(finest(images), (std::vector<uint32_t>{0, 1, 1}));
+    EXPECT_EQ(tilesShown(images, 0, 0), 192);
     EXPECT_EQ(settle(images), 0u);
+}
+
+TEST_F(ImageResidencyTest, WhereMemoryLacksAllIsCoarserByAsMuch) {
+    // Slices of the page show each image, from 2 to 4 cells a pixel.
+    std::vector<ImageNeed> slices;
+    for (uint32_t image = 0; image < 3; ++image)
+        for (uint16_t i = 0; i < 16; ++i) {
+            slices.push_back({image, 0.4f, {}, glm::vec3(0, 0, 4 * i), glm::vec3(64, 64, 4 * i + 4)});
+            for (uint16_t block = 0; block < 256; ++block)
+                if (block % blocksAcross(pieces_->tables().images[image]) == i) slices.back().blocks.push_back(block);
+        }
+    const SelectionView view = pixelsOf(2);
+    for (uint64_t most = kAll; most > 1 << 14; most = most * 2 / 3) {
+        SCOPED_TRACE(most);
+        ImageResidency images(pieces_, most);
+        images.learn(0, slices);
+        look(images, view);
+        settle(images);
+        EXPECT_TRUE(images.isComplete());
+        const std::vector<float> needs = images.needsOn(made_.dataset, view, {0});
+        float leastThere = 100, mostMissing = 0;
+        for (uint64_t piece = 0; piece < needs.size(); ++piece)
+            if (isThere(images, piece))
+                leastThere = std::min(leastThere, needs[piece]);
+            else
+                mostMissing = std::max(mostMissing, needs[piece]);
+        EXPECT_EQ(images.isLimited(), mostMissing > 0);
+        EXPECT_GE(leastThere, mostMissing - 0.25f);
+        EXPECT_GT(leastThere, 0.0f);
+    }
 }
 
 TEST_F(ImageResidencyTest, WhatIsNotInViewAnyMoreIsNotRead) {

@@ -85,13 +85,12 @@ TEST_F(LateImagesTest, APartOfTheViewReadsWhatItsPagesShow) {
     const SelectionView view = selectionView(request_);
     // All that is there was needed, and nothing without pages.
     uint64_t bytes = 0;
-    const std::vector<bool> needed = residency.neededOn(view, residency.cut());
-    for (uint64_t piece = 0; piece < needed.size(); ++piece)
-        if (needed[piece]) bytes += residency.pieces().bytesOf(piece);
+    const std::vector<float> needs = residency.needsOn(view, residency.cut());
+    for (uint64_t piece = 0; piece < needs.size(); ++piece)
+        if (needs[piece] > 0) bytes += residency.pieces().bytesOf(piece);
     EXPECT_EQ(bytes, residency.images()->bytes());
     EXPECT_GT(bytes, 0u);
-    const std::vector<bool> without = residency.neededOn(view, {});
-    EXPECT_EQ(std::count(without.begin(), without.end(), true), 0);
+    EXPECT_EQ(residency.needsOn(view, {}), std::vector<float>(needs.size()));
 }
 
 }  // namespace

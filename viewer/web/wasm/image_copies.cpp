@@ -11,14 +11,14 @@ std::vector<TileRecord> tilesNeeded(const Residency& residency, const SelectionV
     if (!shown || shown->bytes() == 0) return needed;
     std::vector<uint64_t> numbers;
     for (const CutRecord& page : pages) numbers.push_back(page.number);
-    const std::vector<bool> isNeeded = residency.neededOn(view, numbers);
+    const std::vector<float> needs = residency.needsOn(view, numbers);
     uint32_t first = 0;
     for (uint32_t i = 0; i < shown->images().size(); ++i)
         for (uint32_t l = 0; l < shown->images()[i].levels.size(); ++l) {
             const ImageSet::Level& level = shown->images()[i].levels[l];
             for (uint32_t tile = 0; tile < level.tiles.size(); ++tile) {
                 const glm::uvec2 place(tile % level.tilesX, tile / level.tilesX);
-                if (level.tiles[tile] && isNeeded[residency.pieces().pieceOf(i, l, place)])
+                if (level.tiles[tile] && needs[residency.pieces().pieceOf(i, l, place)] > 0)
                     needed.push_back({first + tile, uint32_t(level.texelsOf(tile) * sizeof(uint32_t)),
                                       uint32_t(uintptr_t(level.tiles[tile].get()))});
             }
