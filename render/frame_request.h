@@ -11,6 +11,7 @@
 
 #include "octree/page/paper_page.h"
 #include "render/camera.h"
+#include "render/environment_light.h"
 #include "render/host/section_cut.h"
 
 namespace vcp {
@@ -65,9 +66,11 @@ struct Shading {
     glm::vec3 lightDirection = DirectedLight().direction;
     float lightStrength = DirectedLight().strength;
     std::vector<DirectedLight> moreLights;  ///< beside it: at most kMostLights - 1
-    glm::vec3 clay{0.80f, 0.76f, 0.70f};    ///< linear
-    glm::vec3 cap{0.62f, 0.23f, 0.16f};     ///< linear; colour of cut solids
-    bool shadows = false;                   ///< hard shadows: a further ray a pixel and light
+    /// Light from everywhere; absent: a pale sky above dark ground.
+    std::optional<EnvironmentLight> environment;
+    glm::vec3 clay{0.80f, 0.76f, 0.70f};  ///< linear
+    glm::vec3 cap{0.62f, 0.23f, 0.16f};   ///< linear; colour of cut solids
+    bool shadows = false;                 ///< hard shadows: a further ray a pixel and light
     uint32_t occlusionRays =
         0;  ///< ambient occlusion: so many further rays a pixel, at most kMostOcclusionRays; 0: off
     double occlusionRadius = 0;                    ///< how far they look, world units; 0: a tenth of the box's diagonal

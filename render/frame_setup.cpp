@@ -110,7 +110,7 @@ void setLight(frame::FrameConstants& c, const FrameRequest& request, const FileH
     c.lightLift = float(lift);
     if (!hasLight(s)) return;
     c.occlusionRays = s.occlusionRays;
-    c.hasShadows = s.shadows ? 1 : 0;
+    c.hasShadows = castsShadows(s) ? 1 : 0;
 }
 
 /// Returns the error of a picture, in pixels, as rays of light need it: at least what is tolerated, or what the
@@ -136,7 +136,13 @@ glm::dvec3 towardsLight(const DirectedLight& light, const CameraBasis& basis) {
 
 bool hasLight(const Shading& shading) {
     return (shading.mode == ShadingMode::Lit || shading.mode == ShadingMode::Clay) &&
-           (shading.shadows || shading.occlusionRays > 0);
+           (castsShadows(shading) || shading.occlusionRays > 0);
+}
+
+bool castsShadows(const Shading& shading) {
+    const std::vector<DirectedLight> lights = lightsOf(shading);
+    return shading.shadows &&
+           std::any_of(lights.begin(), lights.end(), [](const DirectedLight& light) { return light.strength > 0; });
 }
 
 uint32_t hitPlanes(const FrameRequest& request, bool colour) {
@@ -190,6 +196,10 @@ frame::FrameConstants frameConstants(const FrameRequest& request, const Dataset*
     c.isCovering = dataset != nullptr && dataset->isCovering() ? 1 : 0;
     const glm::dquat& q = placement.rotation;
     c.rotation = glm::vec4(glm::dvec4(q.x, q.y, q.z, q.w));
+    if (request.shading.environment) {
+        c.hasEnvironment = 1;
+        std::ranges::copy(environmentRows(*request.shading.environment, q), c.environment);
+    }
     setSections(c, request, header);
     setLight(c, request, header, basis, dataset != nullptr ? errorToLift(*dataset, request, errorPixels) : 0);
     return c;
@@ -325,6 +335,12 @@ Result<void> checkRequest(const FrameRequest& request) {
         if (!finite(light.direction) || !(glm::length(light.direction) > 0) || !(light.strength >= 0) ||
             light.strength > kStrongestLight)
             return usage("a light's direction is zero or not a number, or its strength is not from 0 to 10");
+    if (const auto& environment = request.shading.environment)
+        if (!(std::abs(glm::length(environment->up) - 1) < 1e-3) || !std::isfinite(environment->turn) ||
+            !(environment->strength >= 0) || environment->strength > kStrongestEnvironment)
+            return usage(
+                "an environment's axis is not a unit vector, its turn not a number, or its strength not from "
+                "0 to 10");
     if (request.shading.occlusionRays > kMostOcclusionRays) return usage("at most 64 occlusion rays a pixel");
     if (!(request.shading.occlusionRadius >= 0) || !std::isfinite(request.shading.occlusionRadius))
         return usage("the occlusion radius must not be negative");

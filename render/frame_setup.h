@@ -32,6 +32,8 @@ LightDirections lightDirections(const FrameRequest& request, const CameraBasis& 
 
 /// Whether rays of light are traced: where shading asks for them and shows light.
 bool hasLight(const Shading& shading);
+/// Whether shadows are asked for, and a light is there that casts any: an environment does not.
+bool castsShadows(const Shading& shading);
 
 /// Returns how what planes cut open of a dataset is filled. Caps::Closed is for those that have open parts, and say so.
 Caps capsOf(const FrameRequest& request, const Dataset& dataset);

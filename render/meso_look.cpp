@@ -1,5 +1,7 @@
 #include "render/meso_look.h"
 
+#include <algorithm>
+
 #include <glm/geometric.hpp>
 #include <glm/gtc/packing.hpp>
 #include <glm/vec4.hpp>
@@ -72,10 +74,14 @@ void setPicture(frame::MesoView& view, glm::dvec3 origin, const FrameRequest& re
     for (const DirectedLight& light : lightsOf(request.shading))
         view.lights[view.lightCount++] = glm::vec4(glm::vec3(towardsLight(light, basis)), light.strength);
     view.up = lightDirections(request, basis).sky;
+    view.hasEnvironment = request.shading.environment ? 1 : 0;
+    if (request.shading.environment) std::ranges::copy(environmentRows(*request.shading.environment), view.environment);
     view.strayPixels = float(request.errorPixels), view.farShadows = request.shading.shadows ? 1 : 0;
     view.shows = shownIn(request.shading.mode);
 }
 
-bool hasMesoShadows(const Shading& shading) { return shading.shadows && shownIn(shading.mode) == frame::kMesoShowLit; }
+bool hasMesoShadows(const Shading& shading) {
+    return castsShadows(shading) && shownIn(shading.mode) == frame::kMesoShowLit;
+}
 
 }  // namespace vcp

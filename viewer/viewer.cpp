@@ -352,6 +352,7 @@ void Viewer::turnLight(glm::dvec2 by) {
     const glm::dquat turn = glm::angleAxis(by.x, glm::dvec3(0, 1, 0)) * glm::angleAxis(by.y, glm::dvec3(1, 0, 0));
     const glm::dvec3 direction = camera * (turn * (glm::conjugate(camera) * glm::dvec3(shading_.lightDirection)));
     shading_.lightDirection = glm::vec3(glm::normalize(direction));
+    if (shading_.environment) shading_.environment->turn += float(glm::degrees(by.x));
 }
 
 void Viewer::advanceCamera(double now) {
@@ -479,6 +480,7 @@ FrameRequest Viewer::requestWith(int reduction) const {
     request.height = uint32_t(std::max(1, size_.y / reduction));
     request.errorPixels = options_.errorPixels;
     request.shading = shading_;
+    if (request.shading.environment) request.shading.environment->up = directionOf(camera_.up);
     // The first pictures of a scene come without, as moving ones do, so that there is something to look at.
     const bool isFirst = options_.framesAhead && isOpen_ && !hasSettled_;
     if (isMoving(now_) || isFirst) request.shading.occlusionRays = 0;
@@ -502,7 +504,7 @@ void Viewer::setLook(const DatasetLook& look) {
 
 FrameRequest Viewer::pictureOf(glm::ivec2 size) const {
     FrameRequest request = requestWith(1);
-    request.shading = shading_;
+    request.shading.occlusionRays = shading_.occlusionRays;
     request.width = uint32_t(size.x);
     request.height = uint32_t(size.y);
     return request;

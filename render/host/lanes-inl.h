@@ -13,6 +13,7 @@
 #include <cstdint>
 
 #include <glm/vec3.hpp>
+#include <glm/vec4.hpp>
 
 HWY_BEFORE_NAMESPACE();
 namespace vcp::HWY_NAMESPACE {
@@ -101,6 +102,7 @@ struct Lane4 {
 };
 HWY_INLINE Lane3 spread(glm::dvec3 v) { return {Lane(float(v.x)), Lane(float(v.y)), Lane(float(v.z))}; }
 HWY_INLINE Lane3 spread(glm::vec3 v) { return {Lane(v.x), Lane(v.y), Lane(v.z)}; }
+HWY_INLINE Lane3 spread(glm::vec4 v) { return {Lane(v.x), Lane(v.y), Lane(v.z)}; }
 HWY_INLINE Lane2 operator+(Lane2 a, Lane2 b) { return {a.x + b.x, a.y + b.y}; }
 HWY_INLINE Lane2 operator*(Lane2 a, Lane2 b) { return {a.x * b.x, a.y * b.y}; }
 HWY_INLINE Lane2 operator*(Lane a, Lane2 b) { return {a * b.x, a * b.y}; }
@@ -110,6 +112,7 @@ HWY_INLINE Lane3 operator+(Lane3 a, Lane3 b) { return {a.x + b.x, a.y + b.y, a.z
 HWY_INLINE Lane3 operator-(Lane3 a, Lane3 b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
 HWY_INLINE Lane3 operator-(Lane3 a) { return {-a.x, -a.y, -a.z}; }
 HWY_INLINE Lane3 operator*(Lane a, Lane3 b) { return {a * b.x, a * b.y, a * b.z}; }
+HWY_INLINE Lane3 operator*(Lane3 a, Lane3 b) { return {a.x * b.x, a.y * b.y, a.z * b.z}; }
 HWY_INLINE Lane4 operator+(Lane4 a, Lane4 b) { return {a.x + b.x, a.y + b.y, a.z + b.z, a.w + b.w}; }
 HWY_INLINE Lane4 operator-(Lane4 a, Lane4 b) { return {a.x - b.x, a.y - b.y, a.z - b.z, a.w - b.w}; }
 HWY_INLINE Lane4 operator*(Lane4 a, Lane4 b) { return {a.x * b.x, a.y * b.y, a.z * b.z, a.w * b.w}; }

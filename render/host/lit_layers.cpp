@@ -271,18 +271,23 @@ private:
         for (size_t k = 0; k < tile.count; ++k) {
             const size_t to = tile.pixels[k].at;
             const bool isLit = frame_.shadingMode != frame::kShadeNormals && frame_.shadingMode != frame::kShadeUnlit;
-            picture_.colours[to] = isLit && isFar(to) ? farColour(to, surface.sky[k]) : colours[k];
+            picture_.colours[to] =
+                isLit && isFar(to) ? farColour(to, tile.pixels[k].normal, surface.sky[k]) : colours[k];
         }
     }
 
-    /// Returns the colour of what stands for many points.
-    [[nodiscard]] uint32_t farColour(size_t pixel, float skySeen) const {
+    /// Returns the colour of what stands for many points, of a mean normal.
+    [[nodiscard]] uint32_t farColour(size_t pixel, glm::vec3 normal, float skySeen) const {
         const FarLook& far = planes_.far[pixel];
         float sun = 0;
         for (uint32_t i = 0; i < frame_.lightCount; ++i)
             if ((planes_.sun[pixel] & bitsOfLight(frame_, i)) != 0)
                 sun += frame::kMesoSun * lightNumbered(frame_, i).w * far.light[int(i)];
-        return packedColour(glm::vec4(planes_.albedo[pixel] * f32::lightUnderSky(far.sky, sun, skySeen), 1));
+        const glm::vec3 light =
+            frame_.hasEnvironment != 0
+                ? f32::lightInEnvironment(f32::environmentLight(normal, frame_.environment), sun, skySeen)
+                : glm::vec3(f32::lightUnderSky(far.sky, sun, skySeen));
+        return packedColour(glm::vec4(planes_.albedo[pixel] * light, 1));
     }
 
     HostPicture& picture_;

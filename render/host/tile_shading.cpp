@@ -25,6 +25,7 @@ HWY_INLINE Lane pow(Lane x, Lane y) {
 }
 
 // The shared maths of light, for lanes.
+using glm::vec4;
 #define INLINE HWY_INLINE
 #define FOR_LANES
 #define Real Lane
@@ -72,6 +73,8 @@ HWY_INLINE void storeColours(Lane3 colour, uint32_t* words) {
 
 /// Returns the light of all that is seen of them; `seen`: as TileSurface::sun.
 HWY_INLINE Lane sunlightOfAll(const frame::FrameConstants& frame, Lane3 n, Lane seen) {
+    if (frame.lightCount == 1 && frame.lightDirection.w == 1)
+        return sunlightOf(n, spread(glm::vec3(frame.lightDirection)), seen);
     Lane sum(0.0f);
     const LaneWords bits = toByte(seen);
     for (uint32_t i = 0; i < frame.lightCount; ++i) {
@@ -83,22 +86,24 @@ HWY_INLINE Lane sunlightOfAll(const frame::FrameConstants& frame, Lane3 n, Lane 
     return sum;
 }
 
+/// Returns all light on a surface, encoded for the screen.
+HWY_INLINE Lane3 lightOn(const frame::FrameConstants& frame, Lane3 n, Lane seen, Lane skySeen) {
+    const Lane sunlight = sunlightOfAll(frame, n, seen);
+    if (frame.hasEnvironment != 0) return lightInEnvironment(environmentLight(n, frame.environment), sunlight, skySeen);
+    const Lane light = encodedLight(n, spread(glm::vec3(frame.upDirection)), sunlight, skySeen);
+    return {light, light, light};
+}
+
 void shadeTileHere(const frame::FrameConstants& frame, const TileSurface& s, uint32_t* colours) {
-    const Lane3 light = spread(glm::vec3(frame.lightDirection)), up = spread(glm::vec3(frame.upDirection));
     const Lane3 turn = spread(glm::vec3(frame.rotation));
     const Lane half(0.5f);
-    const bool isOne = frame.lightCount == 1 && frame.lightDirection.w == 1;
     for (int i = 0; i < kTilePixels; i += kLanes) {
         const Lane3 n(load(s.normalX + i), load(s.normalY + i), load(s.normalZ + i));
         Lane3 colour(load(s.red + i), load(s.green + i), load(s.blue + i));
         if (frame.shadingMode == frame::kShadeNormals)
             colour = half * turnedBy(turn, Lane(frame.rotation.w), n) + Lane3(half, half, half);
         else if (frame.shadingMode != frame::kShadeUnlit)
-            colour =
-                encodedLight(n, up,
-                             isOne ? sunlightOf(n, light, load(s.sun + i)) : sunlightOfAll(frame, n, load(s.sun + i)),
-                             load(s.sky + i)) *
-                colour;
+            colour = lightOn(frame, n, load(s.sun + i), load(s.sky + i)) * colour;
         storeColours(colour, colours + i);
     }
 }

@@ -57,6 +57,13 @@ float sunlightOfAll(vec3 n, uint seen) {
     return sum;
 }
 
+// Returns all light on a surface, encoded for the screen.
+vec3 lightOn(vec3 n, float sunlight, float skySeen) {
+    if (frame.hasEnvironment != 0u)
+        return lightInEnvironment(environmentLight(n, frame.environment), sunlight, skySeen);
+    return vec3(encodedLight(n, frame.upDirection.xyz, sunlight, skySeen));
+}
+
 void main() {
     uvec2 pixel;
     uint tile;
@@ -90,9 +97,8 @@ void main() {
         if (frame.occlusionRays > 0u) skySeen = sceneSkyAbout(pixel, sceneDepth(at));
     }
     vec3 colour = frame.shadingMode == kShadeNormals ? turnedBy(frame.rotation.xyz, frame.rotation.w, n) * 0.5 + 0.5
-                  : frame.shadingMode == kShadeUnlit
-                      ? albedo
-                      : albedo * encodedLight(n, frame.upDirection.xyz, sunlightOfAll(n, seen), skySeen);
+                  : frame.shadingMode == kShadeUnlit ? albedo
+                                                     : albedo * lightOn(n, sunlightOfAll(n, seen), skySeen);
     if (wired) {
         float line = uintBitsToFloat(fetchHit(frame.lightPlane * plane + at));
         colour = mix(colour, line < 0.0 ? leafInk() : triangleInk(), abs(line));

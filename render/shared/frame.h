@@ -17,7 +17,7 @@ using uvec4 = glm::uvec4;
 
 #include "render/shared/frame_layout.h"
 
-static_assert(sizeof(FrameConstants) == 464 && offsetof(FrameConstants, originLattice) == 96);
+static_assert(sizeof(FrameConstants) == 608 && offsetof(FrameConstants, originLattice) == 96);
 static_assert(offsetof(FrameConstants, width) == 128 && offsetof(FrameConstants, clay) == 192);
 static_assert(offsetof(FrameConstants, pixelEdge) == 224 && offsetof(FrameConstants, paperEpsilon) == 256);
 static_assert(sizeof(FrameCounters) == 16 && sizeof(SceneRay) == 16 && sizeof(TableRecord) == 16 * kRecordTexels);

@@ -70,11 +70,15 @@ struct FrameConstants {
     uint firstHitMark;  // word of the feedback buffer with the first mark of a page that was hit; 0: there are none
     vec4 rotation;      // quaternion: world from the dataset's axes
     uint lightCount;
-    float opacity;  // part of the samples in which the dataset is there
-    uint unused0, unused1;
+    float opacity;        // part of the samples in which the dataset is there
+    uint hasEnvironment;  // 0 or 1
+    uint unused0;
     vec4 moreLights[kMaxMoreLights];  // the other lights, as lightDirection
     // What has dot(xyz, p) + w >= 0 is kept; p in finest cells relative to originLattice.
     vec4 sections[kMaxSections];
+    // The light from everywhere on a surface with the normal x, y, z: red, green and blue of 1, x, y, z, xy, yz, zx, x
+    // x and y y.
+    vec4 environment[9];
 };
 
 // A record of the table is a node of the frame's page tree: three structs, each one texel.

@@ -16,6 +16,28 @@ INLINE Real encodedLight(Real3 n, Real3 up, Real sunlight, Real skySeen) {
     return lightUnderSky(Real(0.5) + Real(0.5) * dot(n, up), sunlight, skySeen);
 }
 
+#ifndef FOR_LANES
+INLINE Real3 spread(vec4 v) { return Real3(v.x, v.y, v.z); }
+#endif
+
+// Returns the light that comes from everywhere onto a surface with a normal, if nothing is in its way: a quadratic form
+// of the normal (Ramamoorthi and Hanrahan 2001, equation 12), where that is not below 0. `rows`: as
+// FrameConstants::environment.
+INLINE Real3 environmentLight(Real3 n, const vec4 rows[9]) {
+    Real3 light = spread(rows[0]) + n.x * (spread(rows[1]) + n.y * spread(rows[4]) + n.x * spread(rows[7])) +
+                  n.y * (spread(rows[2]) + n.z * spread(rows[5]) + n.y * spread(rows[8])) +
+                  n.z * (spread(rows[3]) + n.x * spread(rows[6]));
+    return Real3(max(light.x, Real(0.0)), max(light.y, Real(0.0)), max(light.z, Real(0.0)));
+}
+
+// Returns what lightUnderSky does, under such light in place of the sky.
+INLINE Real3 lightInEnvironment(Real3 environment, Real sunlight, Real skySeen) {
+    Real3 light = skySeen * environment;
+    Real sun = sunlight * (Real(0.5) + Real(0.5) * skySeen);
+    return Real3(pow(sun + light.x, Real(1.0 / 2.2)), pow(sun + light.y, Real(1.0 / 2.2)),
+                 pow(sun + light.z, Real(1.0 / 2.2)));
+}
+
 // Returns what a light of strength 1 gives, where a part of it is seen.
 INLINE Real sunlightOf(Real3 n, Real3 light, Real sunSeen) {
     Real sun = max(dot(n, light), Real(0.0));

@@ -42,8 +42,10 @@ struct MesoView {
     float meanHeight;   // tile units
     uint farShadows;    // 1: what is seen from far has the shadows of the mesostructure on itself
     uint sectionCount;
-    float shadowLift;  // world units by which shadow rays start above a hit
-    uint unused0, unused1, unused2;
+    float shadowLift;     // world units by which shadow rays start above a hit
+    uint hasEnvironment;  // 0 or 1
+    uint unused0, unused1;
     vec4 lights[kMesoMaxLights];      // unit, towards each light; w: its strength
     vec4 sections[kMesoMaxSections];  // as FrameConstants::sections, in world units from the shell's origin
+    vec4 environment[9];              // as FrameConstants::environment, world axes
 };

@@ -375,7 +375,7 @@ std::vector<FrameStep> Renderer::View::litStepsOf(const FrameRequest& request) c
     };
     for (uint32_t ray = 0; ray < request.shading.occlusionRays; ++ray) addRay(ray);
     const auto lights = uint32_t(1 + request.shading.moreLights.size());
-    for (uint32_t light = 0; request.shading.shadows && light < lights; ++light) addRay(frame::kSunRay - light);
+    for (uint32_t light = 0; castsShadows(request.shading) && light < lights; ++light) addRay(frame::kSunRay - light);
     for (size_t i = layers.size(); i-- > 0;) steps.push_back({FrameStep::Pass::Shade, i, 0});
     return steps;
 }

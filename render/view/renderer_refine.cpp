@@ -18,7 +18,7 @@ constexpr uint32_t kSurfaceRays = 8;
 
 uint32_t raysPerPixel(const FrameRequest& request, bool hasSurfaces) {
     const Shading& shading = request.shading;
-    const uint32_t light = hasLight(shading) ? (shading.shadows ? 1 : 0) + shading.occlusionRays : 0;
+    const uint32_t light = hasLight(shading) ? (castsShadows(shading) ? 1 : 0) + shading.occlusionRays : 0;
     return 1 + light + (hasSurfaces ? kSurfaceRays : 0);
 }
 

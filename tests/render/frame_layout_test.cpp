@@ -89,10 +89,11 @@ void expectSameLayout(std::span<const uint32_t> spirv) {
                                                                    OFFSET(rotation),
                                                                    OFFSET(lightCount),
                                                                    OFFSET(opacity),
+                                                                   OFFSET(hasEnvironment),
                                                                    OFFSET(unused0),
-                                                                   OFFSET(unused1),
                                                                    OFFSET(moreLights),
-                                                                   OFFSET(sections)}));
+                                                                   OFFSET(sections),
+                                                                   OFFSET(environment)}));
 }
 
 #define AT(type, member) uint32_t(offsetof(type, member))
@@ -122,16 +123,20 @@ TEST(FrameLayout, Mesostructure) {
     EXPECT_EQ(offsets.at("MesoLevel"), (Words{AT(MesoLevel, first), AT(MesoLevel, entries),
                                               AT(MesoLevel, edgeAndFactor), AT(MesoLevel, bricks)}));
     EXPECT_EQ(offsets.at("MesoBorder"), (Words{AT(MesoBorder, azimuth), AT(MesoBorder, elevation)}));
-    EXPECT_EQ(
-        offsets.at("MesoView"),
-        (Words{
-            AT(MesoView, eye),         AT(MesoView, eyeX),       AT(MesoView, eyeY),       AT(MesoView, forward),
-            AT(MesoView, forwardX),    AT(MesoView, forwardY),   AT(MesoView, width),      AT(MesoView, height),
-            AT(MesoView, nodes),       AT(MesoView, withBase),   AT(MesoView, colour),     AT(MesoView, lightCount),
-            AT(MesoView, up),          AT(MesoView, shows),      AT(MesoView, colours),    AT(MesoView, normals),
-            AT(MesoView, strayPixels), AT(MesoView, meanHeight), AT(MesoView, farShadows), AT(MesoView, sectionCount),
-            AT(MesoView, shadowLift),  AT(MesoView, unused0),    AT(MesoView, unused1),    AT(MesoView, unused2),
-            AT(MesoView, lights),      AT(MesoView, sections)}));
+    EXPECT_EQ(offsets.at("MesoView"), (Words{AT(MesoView, eye),         AT(MesoView, eyeX),
+                                             AT(MesoView, eyeY),        AT(MesoView, forward),
+                                             AT(MesoView, forwardX),    AT(MesoView, forwardY),
+                                             AT(MesoView, width),       AT(MesoView, height),
+                                             AT(MesoView, nodes),       AT(MesoView, withBase),
+                                             AT(MesoView, colour),      AT(MesoView, lightCount),
+                                             AT(MesoView, up),          AT(MesoView, shows),
+                                             AT(MesoView, colours),     AT(MesoView, normals),
+                                             AT(MesoView, strayPixels), AT(MesoView, meanHeight),
+                                             AT(MesoView, farShadows),  AT(MesoView, sectionCount),
+                                             AT(MesoView, shadowLift),  AT(MesoView, hasEnvironment),
+                                             AT(MesoView, unused0),     AT(MesoView, unused1),
+                                             AT(MesoView, lights),      AT(MesoView, sections),
+                                             AT(MesoView, environment)}));
     EXPECT_EQ(offsets.at("MesoImage"),
               (Words{AT(MesoImage, first), AT(MesoImage, width), AT(MesoImage, height), AT(MesoImage, levels)}));
 }

@@ -425,6 +425,9 @@ static void wrong_calls(void) {
     CHECK(vcp_view_set_lines(view, &line, 1) == VCP_USAGE);
     uint32_t visible = 0;
     CHECK(vcp_view_set_visible(view, 7, 0) == VCP_USAGE && vcp_view_is_visible(view, 7, &visible) == VCP_USAGE);
+    CHECK(vcp_view_set_environment(view, "none.hdr", 0, 1) == VCP_IO && strstr(vcp_view_last_error(view), "none.hdr"));
+    CHECK(vcp_view_set_environment(view, "studio", NAN, 1) == VCP_USAGE &&
+          vcp_view_set_environment(view, "studio", 0, 11) == VCP_USAGE);
     CHECK(vcp_view_save_png(view, NULL) == VCP_USAGE && vcp_view_save_png(view, "-") == VCP_USAGE);
     CHECK(vcp_context_start_open(context, NULL, NULL) == VCP_USAGE &&
           vcp_context_start_open_placed(context, NULL, 1, NULL) == VCP_USAGE &&

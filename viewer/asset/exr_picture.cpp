@@ -148,7 +148,8 @@ private:
             const auto count = countChannels(value);
             if (!count) return damaged("its list of channels");
             if (*count > kMostChannels)
-                return wrong(ErrorCode::Limit, fmt::format("an EXR of {} channels; a height map needs one", *count));
+                return wrong(ErrorCode::Limit,
+                             fmt::format("an EXR of {} channels; at most {} are read", *count, kMostChannels));
             texelBytes_ = sizeof(float) * std::max<size_t>(*count, 1);
         }
         return {};
@@ -159,7 +160,7 @@ private:
         if (width < 1 || height < 1) return damaged("a data window without texels");
         if (width > mostEdge || height > mostEdge)
             return wrong(ErrorCode::Limit,
-                         fmt::format("{} x {} texels; a height map has at most {} an edge", width, height, mostEdge));
+                         fmt::format("{} x {} texels; at most {} an edge are read", width, height, mostEdge));
         VCP_TRY(hasTiles_ ? checkTiles(uint64_t(width), uint64_t(height))
                           : checkLines(uint64_t(width), uint64_t(height)));
         const uint64_t expansion = compression_ >= kDwaa ? kMostDwaExpansion : kMostExpansion;
@@ -247,34 +248,63 @@ std::vector<std::string> channelsOf(const Imf::ChannelList& list) {
     return found.size() == 1 ? found : std::vector<std::string>{};
 }
 
-/// Decodes the picture; throws what the library throws.
-Result<FloatPicture> decoded(std::span<const std::byte> file, std::span<const std::byte> header, glm::ivec2 size) {
-    MemoryStream stream(file, header);
-    Imf::InputFile input(stream, 0);
-    const Imf::ChannelList& list = input.header().channels();
-    const auto channels = channelsOf(list);
-    if (channels.empty()) return wrong(ErrorCode::Unsupported, "has no channel Y, R, G or B, and not just one");
+/// Reads a channel; throws what the library throws.
+Result<std::vector<float>> planeOf(Imf::InputFile& input, const std::string& name, glm::ivec2 size) {
+    const Imf::Channel& channel = *input.header().channels().findChannel(name);
+    if (channel.xSampling != 1 || channel.ySampling != 1)
+        return wrong(ErrorCode::Unsupported, fmt::format("its channel {} has fewer texels than the picture", name));
     const Imath::Box2i window = input.header().dataWindow();
-    FloatPicture picture{size, std::vector<float>(size_t(size.x) * size_t(size.y))};
-    std::vector<float> plane(picture.values.size());
+    std::vector<float> plane(size_t(size.x) * size_t(size.y));
     const size_t texel = sizeof(float), row = texel * size_t(size.x);
+    Imf::FrameBuffer frame;
+    frame.insert(name, Imf::Slice::Make(Imf::FLOAT, plane.data(), window, texel, row));
+    input.setFrameBuffer(frame);
+    input.readPixels(window.min.y, window.max.y);
+    for (size_t i = 0; i < plane.size(); ++i)
+        if (!std::isfinite(plane[i]))
+            return Error{.code = ErrorCode::InvalidInput,
+                         .message = "is no finite number",
+                         .element = fmt::format("texel {}, {}", i % size_t(size.x), i / size_t(size.x))};
+    return plane;
+}
+
+/// Decodes the picture; throws what the library throws.
+Result<FloatPicture> meanOf(Imf::InputFile& input, glm::ivec2 size) {
+    const auto channels = channelsOf(input.header().channels());
+    if (channels.empty()) return wrong(ErrorCode::Unsupported, "has no channel Y, R, G or B, and not just one");
+    FloatPicture picture{size, std::vector<float>(size_t(size.x) * size_t(size.y))};
     for (const std::string& name : channels) {
-        const Imf::Channel& channel = *list.findChannel(name);
-        if (channel.xSampling != 1 || channel.ySampling != 1)
-            return wrong(ErrorCode::Unsupported, fmt::format("its channel {} has fewer texels than the picture", name));
-        Imf::FrameBuffer frame;
-        frame.insert(name, Imf::Slice::Make(Imf::FLOAT, plane.data(), window, texel, row));
-        input.setFrameBuffer(frame);
-        input.readPixels(window.min.y, window.max.y);
-        for (size_t i = 0; i < plane.size(); ++i) {
-            if (!std::isfinite(plane[i]))
-                return Error{.code = ErrorCode::InvalidInput,
-                             .message = "is no finite number",
-                             .element = fmt::format("texel {}, {}", i % size_t(size.x), i / size_t(size.x))};
-            picture.values[i] += plane[i] / float(channels.size());
-        }
+        VCP_TRY_ASSIGN(const auto plane, planeOf(input, name, size));
+        for (size_t i = 0; i < plane.size(); ++i) picture.values[i] += plane[i] / float(channels.size());
     }
     return picture;
+}
+Result<FloatColours> coloursOf(Imf::InputFile& input, glm::ivec2 size) {
+    FloatColours colours{size, {}};
+    const Imf::ChannelList& list = input.header().channels();
+    for (size_t i = 0; i < 3; ++i) {
+        const std::string name(1, "RGB"[i]);
+        const bool isColoured = list.findChannel("R") && list.findChannel("G") && list.findChannel("B");
+        if (!isColoured && !list.findChannel("Y"))
+            return wrong(ErrorCode::Unsupported, "has no channels R, G and B, and no Y");
+        VCP_TRY_ASSIGN(colours.planes[i], planeOf(input, isColoured ? name : "Y", size));
+    }
+    return colours;
+}
+
+template <class Picture>
+Result<Picture> decoded(std::span<const std::byte> file, int mostEdge,
+                        Result<Picture> (*pictureOf)(Imf::InputFile& input, glm::ivec2 size)) {
+    if (!isExr(file)) return wrong(ErrorCode::InvalidInput, "is not an EXR");
+    HeaderWalk walk(file);
+    VCP_TRY_ASSIGN(const auto size, walk.sizeOf(mostEdge));
+    try {
+        MemoryStream stream(file, walk.header());
+        Imf::InputFile input(stream, 0);
+        return pictureOf(input, size);
+    } catch (const std::exception& failure) {
+        return damaged(failure.what());
+    }
 }
 
 #endif
@@ -290,14 +320,10 @@ bool isExr(std::span<const std::byte> file) {
 bool readsExr() { return true; }
 
 Result<FloatPicture> decodeExr(std::span<const std::byte> file, int mostEdge) {
-    if (!isExr(file)) return wrong(ErrorCode::InvalidInput, "is not an EXR");
-    HeaderWalk walk(file);
-    VCP_TRY_ASSIGN(const auto size, walk.sizeOf(mostEdge));
-    try {
-        return decoded(file, walk.header(), size);
-    } catch (const std::exception& failure) {
-        return damaged(failure.what());
-    }
+    return decoded(file, mostEdge, meanOf);
+}
+Result<FloatColours> decodeExrColours(std::span<const std::byte> file, int mostEdge) {
+    return decoded(file, mostEdge, coloursOf);
 }
 
 #else
@@ -307,6 +333,10 @@ bool readsExr() { return false; }
 Result<FloatPicture> decodeExr(std::span<const std::byte>, int) {
     return wrong(ErrorCode::Unsupported,
                  "is an EXR picture, and this program was built without OpenEXR; save it as a PNG of 16 bits");
+}
+Result<FloatColours> decodeExrColours(std::span<const std::byte>, int) {
+    return wrong(ErrorCode::Unsupported,
+                 "is an EXR picture, and this program was built without OpenEXR; save it as a .hdr");
 }
 
 #endif

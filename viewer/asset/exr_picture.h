@@ -1,6 +1,7 @@
-// Reads EXR pictures of one value a texel, in which height maps of floats are stored.
+// Reads EXR pictures: of one value a texel, in which height maps of floats are stored, and of colours.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -17,6 +18,11 @@ struct FloatPicture {
     std::vector<float> values;  ///< row by row from the top, finite
 };
 
+struct FloatColours {
+    glm::ivec2 size{0};
+    std::array<std::vector<float>, 3> planes;  ///< red, green and blue, each row by row from the top, finite
+};
+
 /// Whether this program was built with OpenEXR.
 bool readsExr();
 
@@ -31,5 +37,8 @@ bool isExr(std::span<const std::byte> file);
 /// tiles or channels out of proportion), Unsupported (deep, several parts, other channels, or a program built without
 /// OpenEXR).
 Result<FloatPicture> decodeExr(std::span<const std::byte> file, int mostEdge);
+
+/// Does so with the channels R, G and B, or where one lacks, with Y for all of them.
+Result<FloatColours> decodeExrColours(std::span<const std::byte> file, int mostEdge);
 
 }  // namespace vcp

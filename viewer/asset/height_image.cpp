@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <cstdio>
 #include <cstring>
 #include <memory>
 #include <span>
@@ -14,8 +13,8 @@
 
 #include "builder/stream/random_bytes.h"
 #include "builder/texture/png_chunks.h"
-#include "octree/io/regular_file.h"
 #include "viewer/asset/exr_picture.h"
+#include "viewer/asset/picture_file.h"
 
 namespace vcp {
 
@@ -65,21 +64,6 @@ bool readRows(PngReader& reader, png_bytepp rows) {
     png_read_image(reader.png, rows);
     png_read_end(reader.png, nullptr);
     return true;
-}
-
-constexpr size_t kMostFileBytes = size_t{1} << 29;
-
-Result<std::vector<std::byte>> wholeFile(std::FILE* file) {
-    std::vector<std::byte> bytes;
-    while (true) {
-        const size_t had = bytes.size();
-        bytes.resize(std::max<size_t>(2 * had, 1 << 16));
-        const size_t got = std::fread(bytes.data() + had, 1, bytes.size() - had, file);
-        bytes.resize(had + got);
-        if (std::ferror(file)) return Error{.code = ErrorCode::Io, .message = "cannot be read"};
-        if (bytes.size() > kMostFileBytes) return Error{.code = ErrorCode::Limit, .message = "is larger than 512 MiB"};
-        if (got == 0) return bytes;
-    }
 }
 
 Result<meso::HeightMap> exrHeights(std::span<const std::byte> file, double range) {
@@ -155,13 +139,8 @@ Result<meso::HeightMap> decodeHeights(std::span<const std::byte> file, double ra
 }
 
 Result<meso::HeightMap> readHeightImage(const std::filesystem::path& path, double range) {
-    VCP_TRY_ASSIGN(const auto file, openRegularStream(path));
-    const auto bytes = wholeFile(file.get());
-    auto map = bytes ? decodeHeights(*bytes, range) : Result<meso::HeightMap>(bytes.error());
-    if (map) return map;
-    Error error = map.error();
-    error.file = path.string();
-    return error;
+    const auto decode = [range](std::span<const std::byte> file) { return decodeHeights(file, range); };
+    return decodedFile<meso::HeightMap>(path, decode);
 }
 
 }  // namespace vcp

@@ -28,8 +28,6 @@ constexpr double kPoleMargin = 1e-3;
 // Room around a fitted box, as a part of the picture.
 constexpr double kFitMargin = 1.04;
 
-glm::dvec3 axisOf(UpAxis up) { return up == UpAxis::Y ? glm::dvec3(0, 1, 0) : glm::dvec3(0, 0, 1); }
-
 glm::dvec2 tangents(double fovY, glm::ivec2 size) {
     const double y = std::tan(0.5 * fovY);
     return {y * size.x / std::max(size.y, 1), y};
@@ -64,6 +62,8 @@ std::array<glm::dvec3, 8> cornersOf(const Box& box) {
 bool finite(glm::dvec3 v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
 
 }  // namespace
+
+glm::dvec3 directionOf(UpAxis up) { return up == UpAxis::Y ? glm::dvec3(0, 1, 0) : glm::dvec3(0, 0, 1); }
 
 glm::dquat facing(glm::dvec3 forward, glm::dvec3 up) {
     const glm::dvec3 back = -glm::normalize(forward);
@@ -114,7 +114,7 @@ std::optional<glm::dvec2> OrbitCamera::pixelOf(glm::dvec3 point, glm::ivec2 size
 }
 
 void OrbitCamera::orbit(glm::dvec3 pivot, double yaw, double pitch) {
-    const glm::dvec3 axis = axisOf(up);
+    const glm::dvec3 axis = directionOf(up);
     const double elevation = std::asin(std::clamp(glm::dot(forwardVector(), axis), -1.0, 1.0));
     // A top view starts at the pole itself; it may leave the pole, but not pass it.
     const double limit = std::max(0.5 * std::numbers::pi - kPoleMargin, std::abs(elevation));
@@ -130,7 +130,7 @@ void OrbitCamera::centreOn(glm::dvec3 point) { position = point - forwardVector(
 
 void OrbitCamera::standUp(UpAxis axis) {
     up = axis;
-    const glm::dvec3 upward = axisOf(axis), ahead = forwardVector();
+    const glm::dvec3 upward = directionOf(axis), ahead = forwardVector();
     const bool isAlong = glm::length(glm::cross(ahead, upward)) < kPoleMargin;
     orientation = facing(ahead, isAlong ? upVector() : upward);
 }
@@ -204,7 +204,7 @@ void OrbitCamera::fitAround(const Box& box, glm::ivec2 size, int count) {
 
 void OrbitCamera::look(View view, const Box& box, glm::ivec2 size, const PictureMargins& covered) {
     // With y up the front faces +z; with z up it faces -y. The other views follow from front and up.
-    const glm::dvec3 upward = axisOf(up);
+    const glm::dvec3 upward = directionOf(up);
     const glm::dvec3 front = up == UpAxis::Y ? glm::dvec3(0, 0, 1) : glm::dvec3(0, -1, 0);
     const glm::dvec3 right = glm::cross(upward, front);
     switch (view) {
@@ -235,7 +235,7 @@ void OrbitCamera::look(View view, const Box& box, glm::ivec2 size, const Picture
 }
 
 void OrbitCamera::look(const ViewAngles& from, const Box& box, glm::ivec2 size, const PictureMargins& covered) {
-    const glm::dvec3 upward = axisOf(up), right(1, 0, 0), away = glm::cross(upward, right);
+    const glm::dvec3 upward = directionOf(up), right(1, 0, 0), away = glm::cross(upward, right);
     const glm::dvec2 angles = glm::radians(glm::dvec2(from.azimuth, from.elevation));
     const glm::dvec3 eye =
         std::cos(angles.y) * (std::cos(angles.x) * right + std::sin(angles.x) * away) + std::sin(angles.y) * upward;
@@ -366,7 +366,7 @@ Result<OrbitCamera> cameraFromJson(std::string_view text, const std::string& nam
                                                                                         : Projection::Orthographic;
     camera.position = fields.triple("position", std::nullopt);
     const glm::dvec3 target = fields.triple("target", std::nullopt);
-    const glm::dvec3 up = fields.triple("up", axisOf(camera.up));
+    const glm::dvec3 up = fields.triple("up", directionOf(camera.up));
     const double degrees = fields.number("fov_degrees", 45);
     if (!(degrees > 0.001 && degrees < 177)) fields.wrong("fov_degrees", "must be between 0.001 and 177");
     if (fields.error()) return *fields.error();

@@ -55,6 +55,8 @@ struct Box {
 Box placedBox(const Box& box, const Similarity& placement);
 
 enum class UpAxis { Y, Z };
+/// Returns its direction in the world.
+glm::dvec3 directionOf(UpAxis up);
 
 /// Standard views of a box. `Fit` is the view a dataset opens with: the front.
 enum class View { Fit, Front, Back, Left, Right, Top, Bottom, Isometric };

@@ -18,6 +18,7 @@
 #include "viewer/command/render_outputs.h"
 #include "viewer/command/terminal/interrupt.h"
 #include "viewer/picture/image_files.h"
+#include "viewer/scene/environment.h"
 #include "viewer/scene/meso_scene.h"
 #include "viewer/scene/option_values.h"
 #include "viewer/scene/scene_opening.h"
@@ -107,7 +108,8 @@ Result<void> checkOptions(const RenderCommand& command) {
 OutputRules rulesOf(const RenderCommand& command, const std::vector<std::filesystem::path>& filesRead) {
     OutputRules rules{.overwrite = command.overwrite, .inputs = filesRead};
     for (const std::string& name : command.inputs) rules.inputs.emplace_back(name);
-    for (const std::string& name : {command.path, command.measurement, command.render.source.caFile})
+    for (const std::string& name :
+         {command.path, command.measurement, command.render.source.caFile, command.render.environment.source})
         if (!name.empty()) rules.inputs.emplace_back(name);
     if (const auto* file = std::get_if<std::filesystem::path>(&command.render.camera)) rules.inputs.push_back(*file);
     return rules;
@@ -124,8 +126,9 @@ Result<void> checkOutputs(const RenderCommand& command, const OutputRules& rules
 }
 
 /// Returns the request for the picture: options go before what the scene says, but for the light.
-FrameRequest requestFor(const RenderCommand& command, const SceneFile& scene, const OrbitCamera& camera,
+FrameRequest requestFor(const RenderCommand& command, const OpenedScene& open, const OrbitCamera& camera,
                         const Box& bounds) {
+    const SceneFile& scene = open.file;
     FrameRequest request;
     request.camera = camera.current();
     request.width = uint32_t(command.size.x);
@@ -139,7 +142,8 @@ FrameRequest requestFor(const RenderCommand& command, const SceneFile& scene, co
         request.sections = scene.sections;
         request.sectionCaps = std::max(command.render.caps, scene.sectionCaps);
     }
-    if (!scene.lights.empty()) setLights(request.shading, scene.lights);
+    setSceneLight(request.shading, open, command.render.shading);
+    if (request.shading.environment) request.shading.environment->up = directionOf(camera.up);
     request.looks = looksOf(scene);
     request.march = command.render.march;
     return request;
@@ -177,7 +181,7 @@ Result<Json> render(const RenderCommand& command) {
     VCP_TRY_ASSIGN(auto renderer, createPictureRenderer(options));
     VCP_TRY(renderer->open(open.placed(), open.surfaces.surfaces));
 
-    const FrameRequest request = requestFor(command, scene, camera, bounds);
+    const FrameRequest request = requestFor(command, open, camera, bounds);
     const InterruptScope catching;
     if (!command.isTiled(request)) return drawOne(*renderer, request, camera, paintOver, command, scene, rules);
     if (!command.methods.empty())
@@ -225,7 +229,8 @@ Result<void> prepareOutputs(const std::vector<RenderCommand>& commands) {
     return {};
 }
 
-Result<int> run(const RenderCommand& command) {
+Result<int> run(RenderCommand command) {
+    VCP_TRY(command.render.takeEnvironment());
     const bool isForEach = isForEachInput(command.output);
     std::vector<RenderCommand> commands{command};
     if (isForEach) {

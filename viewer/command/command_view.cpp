@@ -78,6 +78,7 @@ Result<int> run(ViewCommand command, const CLI::App& app) {
         return Error{.code = ErrorCode::Usage,
                      .message = "the host draws no window, only pictures (vcp render); choose a Vulkan device"};
     VCP_TRY(checkInputs(command));
+    VCP_TRY(command.render.takeEnvironment());
     const auto settingsPath = userSettingsPath();
     WindowOptions options;
     // Where the settings cannot be read, the defaults are used.

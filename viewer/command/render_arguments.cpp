@@ -19,8 +19,9 @@ namespace {
 constexpr glm::vec3 kRakingLight(-0.97f, 0.17f, 0.17f);
 
 /// Adds --light and then --light-direction, which are taken in this order.
-void addLight(CLI::App& app, Shading& shading) {
-    const auto take = [&shading](const std::string& which) {
+void addLight(CLI::App& app, RenderSettings& settings) {
+    const auto take = [&settings, &shading = settings.shading](const std::string& which) {
+        settings.hasLight = true;
         shading.lightFollowsCamera = which != "fixed";
         if (which == "raking") shading.lightDirection = kRakingLight;
     };
@@ -30,9 +31,30 @@ void addLight(CLI::App& app, Shading& shading) {
         ->type_name("WHICH")
         ->default_str("camera")
         ->check(CLI::IsMember({"camera", "raking", "fixed"}));
-    addParsed(app, "--light-direction", shading.lightDirection, parseDirection, "like 1,0,0.5",
+    const auto parse = [&settings](std::string_view text) {
+        settings.hasLight = true;
+        return parseDirection(text);
+    };
+    addParsed(app, "--light-direction", settings.shading.lightDirection, parse, "like 1,0,0.5",
               "Towards the light: right, up, back of the camera; with --light fixed x, y, z of the world")
         ->type_name("X,Y,Z");
+}
+
+void addEnvironment(CLI::App& app, EnvironmentChoice& environment) {
+    CLI::Option* source =
+        app.add_option("--environment", environment.source,
+                       fmt::format("Light from everywhere, in place of the light where none is asked for: {}, or a "
+                                   "picture of the surroundings (.hdr, .exr; equirectangular)",
+                                   fmt::join(kEnvironmentNames, ", ")))
+            ->type_name("NAME|FILE");
+    app.add_option("--environment-turn", environment.turn, "Degrees that the surroundings are turned to the left")
+        ->type_name("DEGREES")
+        ->needs(source)
+        ->check(CLI::Range(-360.0, 360.0));
+    app.add_option("--environment-strength", environment.strength, "Times the usual light of the surroundings")
+        ->type_name("TIMES")
+        ->needs(source)
+        ->check(CLI::Range(0.0, double(kStrongestEnvironment)));
 }
 
 void addUp(CLI::App& app, UpAxis& up) {
@@ -68,7 +90,8 @@ void addCameraSettings(CLI::App& app, RenderSettings& settings) {
 void addRenderSettings(CLI::App& app, RenderSettings& settings) {
     addCameraSettings(app, settings);
     const ScopedGroup scope(app, help_group::kLook);
-    addLight(app, settings.shading);
+    addLight(app, settings);
+    addEnvironment(app, settings.environment);
     addParsed(
         app, "--shading", settings.shading.mode, shadingNamed, fmt::format("one of {}", fmt::join(kShadingNames, ", ")),
         "lit or unlit (with colour where there is any), clay, normals; false colours: level (of detail), error (up "

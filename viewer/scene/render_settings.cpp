@@ -6,6 +6,7 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
+#include "viewer/scene/environment.h"
 #include "viewer/scene/option_values.h"
 
 namespace vcp {
@@ -34,6 +35,13 @@ RendererOptions RenderSettings::rendererOptions() const {
     // Colour pages are neither read nor kept when nothing would show them.
     options.colour = shading.mode == ShadingMode::Lit || shading.mode == ShadingMode::Unlit;
     return options;
+}
+
+Result<void> RenderSettings::takeEnvironment() {
+    if (environment.source.empty()) return {};
+    VCP_TRY_ASSIGN(shading.environment, openEnvironment(environment));
+    if (!hasLight) shading.lightStrength = 0;
+    return {};
 }
 
 Result<void> RenderSettings::checkFor(const Dataset& dataset) const {

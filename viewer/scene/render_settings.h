@@ -38,6 +38,8 @@ struct RenderSettings {
     CameraChoice camera = View::Fit;
     UpAxis up = UpAxis::Y;
     Shading shading;
+    EnvironmentChoice environment;  ///< without a source: none was asked for
+    bool hasLight = false;          ///< a light was asked for, which there is beside the environment
     std::vector<PlaneChoice> sections;
     Caps caps = Caps::None;
     PaperMarch march;
@@ -46,6 +48,9 @@ struct RenderSettings {
 
     /// Checks that the settings go with the dataset's method. Errors: Usage.
     [[nodiscard]] Result<void> checkFor(const Dataset& dataset) const;
+
+    /// Takes the light of the environment that was asked for. Errors: those of openEnvironment.
+    [[nodiscard]] Result<void> takeEnvironment();
 
     /// Returns the renderer's options for a local file; a server needs more loader threads.
     [[nodiscard]] RendererOptions rendererOptions() const;

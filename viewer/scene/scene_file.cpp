@@ -47,7 +47,8 @@ public:
     SceneFile scene(const Json& json) {
         SceneFile scene;
         if (!json.is_object()) return wrong("", "a scene must be a JSON object"), scene;
-        onlyKeys(json, "", {"datasets", "lights", "camera", "sections", "caps", "annotations", "mesostructure"});
+        onlyKeys(json, "",
+                 {"datasets", "lights", "environment", "camera", "sections", "caps", "annotations", "mesostructure"});
         if (json.contains("mesostructure")) scene.surfaces = surfaces(json["mesostructure"]);
         if (!json.contains("datasets") && scene.surfaces.empty()) wrong("", "\"datasets\" is missing");
         const Json& datasets = json.value("datasets", Json::array());
@@ -57,6 +58,7 @@ public:
         for (size_t i = 0; i < datasets.size() && !error_; ++i)
             scene.datasets.push_back(dataset(datasets[i], fmt::format("/datasets/{}", i)));
         if (json.contains("lights")) scene.lights = lights(json["lights"]);
+        if (json.contains("environment")) scene.environment = environment(json["environment"]);
         if (json.contains("camera")) scene.camera = camera(json["camera"]);
         if (json.contains("sections")) scene.sections = sections(json["sections"]);
         if (json.contains("caps")) scene.sectionCaps = caps(json["caps"]);
@@ -356,10 +358,27 @@ private:
         return all;
     }
 
-    float strength(const Json& value, const std::string& at) {
+    std::optional<EnvironmentChoice> environment(const Json& json) {
+        const std::string at = "/environment";
+        if (!isObject(json, at)) return std::nullopt;
+        onlyKeys(json, at, {"source", "turn_degrees", "strength"});
+        EnvironmentChoice made;
+        const auto isPicture = [](const std::string& name) {
+            return std::ranges::find(kEnvironmentNames, name) == kEnvironmentNames.end();
+        };
+        if (json.contains("source"))
+            made.source = named(json["source"], at + "/source", isPicture);
+        else
+            wrong(at, "\"source\" is missing");
+        if (json.contains("turn_degrees")) made.turn = float(number(json["turn_degrees"], at + "/turn_degrees"));
+        if (json.contains("strength"))
+            made.strength = strength(json["strength"], at + "/strength", kStrongestEnvironment);
+        return made;
+    }
+
+    float strength(const Json& value, const std::string& at, float most = kStrongestLight) {
         const double number = this->number(value, at);
-        if (!(number >= 0 && number <= kStrongestLight))
-            wrong(at, fmt::format("must be from 0 to {:g}", kStrongestLight));
+        if (!(number >= 0 && number <= most)) wrong(at, fmt::format("must be from 0 to {:g}", most));
         return float(number);
     }
 
@@ -462,6 +481,7 @@ std::vector<std::filesystem::path> filesOf(const SceneFile& scene) {
     for (const MesoSurfaceDescription& surface : scene.surfaces)
         for (const std::string& name : {surface.asset, surface.base, surface.colourTexture, surface.normalTexture})
             if (!name.empty()) files.emplace_back(name);
+    if (scene.environment) files.emplace_back(scene.environment->source);
     return files;
 }
 

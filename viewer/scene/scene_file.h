@@ -27,10 +27,20 @@ struct SceneDataset {
     float opacity = 1;
 };
 
+/// Surroundings whose light falls on a scene.
+struct EnvironmentChoice {
+    std::string source;  ///< one of kEnvironmentNames, or a picture (.hdr, .exr)
+    float turn = 0;      ///< degrees, as EnvironmentLight
+    float strength = 1;  ///< 0 to kStrongestEnvironment
+
+    bool operator==(const EnvironmentChoice&) const = default;
+};
+
 struct SceneFile {
     std::vector<SceneDataset> datasets;  ///< at least one, or a surface
     std::vector<MesoSurfaceDescription> surfaces;
-    std::vector<DirectedLight> lights;  ///< at most kMostLights; none: the usual one
+    std::vector<DirectedLight> lights;  ///< at most kMostLights; none: the usual one, or that of the environment
+    std::optional<EnvironmentChoice> environment;
     std::optional<OrbitCamera> camera;
     std::vector<SectionPlane> sections;  ///< at most kMostSections
     Caps sectionCaps = Caps::None;
@@ -46,7 +56,7 @@ constexpr size_t kLongestTitle = 200, kLongestText = 2000;
 /// Returns the looks of datasets that are not shown as they are.
 std::vector<DatasetLook> looksOf(const SceneFile& scene);
 
-/// Returns the files that a scene names: datasets and meshes without addresses, assets, bases and textures.
+/// Returns the files that a scene names: datasets and meshes without addresses, assets, bases, textures, surroundings.
 std::vector<std::filesystem::path> filesOf(const SceneFile& scene);
 
 /// Does similarityFromMatrix, within what a scene may have: translations of at most 1e12, scales from 1e-9 to 1e9.

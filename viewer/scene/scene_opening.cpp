@@ -10,6 +10,7 @@
 #include "streaming/caching_reader.h"
 #include "streaming/http_reader.h"
 #include "streaming/web_address.h"
+#include "viewer/scene/environment.h"
 
 namespace vcp {
 
@@ -75,6 +76,9 @@ Result<OpenedScene> openScene(SceneFile file, const std::string& name,
         scene.parts.push_back({*std::move(opened), each.placement});
     }
     VCP_TRY_ASSIGN(scene.surfaces, makeMesoScene(scene.file.surfaces));
+    if (scene.file.environment) {
+        VCP_TRY_ASSIGN(scene.environment, openEnvironment(*scene.file.environment));
+    }
     const Box all = scene.bounds();
     if (!std::isfinite(glm::length(all.high - all.low)))
         return Error{.code = ErrorCode::InvalidInput,

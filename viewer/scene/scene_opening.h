@@ -60,6 +60,7 @@ struct OpenedScene {
     };
     std::vector<Part> parts;                       ///< at least one, or a surface
     MesoScene surfaces;                            ///< made from the file's surfaces
+    std::optional<EnvironmentLight> environment;   ///< of the file's
     SceneFile file;                                ///< light, camera and sections of a scene file; empty without one
     std::vector<std::filesystem::path> filesRead;  ///< files that no output may replace; may include addresses
 

@@ -111,6 +111,12 @@ std::string sceneToJson(const SceneFile& scene) {
         }
         text.add("lights", lights);
     }
+    if (const auto& environment = scene.environment) {
+        OrderedJson json{{"source", environment->source}};
+        if (environment->turn != 0) json["turn_degrees"] = environment->turn;
+        if (environment->strength != 1) json["strength"] = environment->strength;
+        text.add("environment", json);
+    }
     if (scene.camera) text.add("camera", OrderedJson::parse(cameraToJson(*scene.camera)));
     text.addList("sections", scene.sections, [](const SectionPlane& plane) {
         return OrderedJson{{"normal", triple(plane.normal)}, {"offset", plane.offset}};

@@ -349,6 +349,12 @@ void bindLook(py::class_<View>& view) {
              "planes"_a, "caps"_a = false, "Keeps what has a x + b y + c z >= d of each plane (a, b, c, d).")
         .def("set_lines", setLines, "lines"_a,
              "Paints lines over pictures: [(points, (r, g, b, opacity), width), ...].")
+        .def(
+            "set_environment",
+            [](View& self, const std::optional<std::string>& source, float turn, float strength) {
+                self.setEnvironment(source ? source->c_str() : nullptr, turn, strength);
+            },
+            "source"_a, "turn_degrees"_a = 0.0f, "strength"_a = 1.0f)
         .def("set_visible", &View::setVisible, "dataset"_a, "visible"_a)
         .def("is_visible", &View::isVisible, "dataset"_a)
         .def_property(

@@ -196,6 +196,10 @@ public:
     void moveCamera(const vcp_camera& camera) { check(vcp_view_move_camera(handle(), &camera)); }
     [[nodiscard]] vcp_look look() const { return got(vcp_view_get_look); }
     void setLook(const vcp_look& look) { check(vcp_view_set_look(handle(), &look)); }
+    /// nullptr: the light is as before.
+    void setEnvironment(const char* source, float turnDegrees = 0, float strength = 1) {
+        check(vcp_view_set_environment(handle(), source, turnDegrees, strength));
+    }
 
     void setVisible(uint32_t dataset, bool isVisible) {
         check(vcp_view_set_visible(handle(), dataset, isVisible ? 1 : 0));

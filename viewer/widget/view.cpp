@@ -9,6 +9,7 @@
 
 #include "render/picture.h"
 #include "viewer/key_map.h"
+#include "viewer/scene/environment.h"
 #include "viewer/widget/handles.h"
 #include "viewer/widget/window_surface.h"
 
@@ -293,6 +294,22 @@ Result<void> checkLook(const vcp_look& look) {
     return {};
 }
 
+Result<void> setEnvironment(vcp_view& view, const char* source, float turn, float strength) {
+    Shading shading = view.viewer->shading();
+    if (source == nullptr) {
+        shading.environment.reset();
+        shading.lightStrength = DirectedLight().strength;
+    } else {
+        if (!std::isfinite(turn)) return wrong("the turn is not finite");
+        if (!(strength >= 0 && strength <= kStrongestEnvironment)) return wrong("the strength is not 0 to 10");
+        VCP_TRY_ASSIGN(shading.environment, openEnvironment({source, turn, strength}));
+        shading.lightStrength = 0;
+    }
+    view.viewer->setShading(shading);
+    view.hasSceneLight = true;  // what is opened next takes it away, as the light of a scene
+    return {};
+}
+
 Result<void> setLook(vcp_view& view, const vcp_look* given) {
     if (!given) return wrong("there is no look");
     Viewer& viewer = *view.viewer;
@@ -415,9 +432,9 @@ void vcp_view::showScene() {
     viewer->show(scene.placed(), scene.surfaces, scene.file.camera.value_or(camera), context->name);
     viewer->setLooks(looksOf(scene.file));
     // The lights and planes of one scene do not apply to the next.
-    if (std::exchange(hasSceneLight, !scene.file.lights.empty()) || hasSceneLight) {
+    if (std::exchange(hasSceneLight, hasOwnLight(scene)) || hasSceneLight) {
         vcp::Shading shading = viewer->shading();
-        setLights(shading, scene.file.lights.empty() ? lightsOf(vcp::Shading()) : scene.file.lights);
+        setSceneLight(shading, scene, vcp::Shading());
         viewer->setShading(shading);
     }
     if (std::exchange(hasSceneSections, !scene.file.sections.empty()) || hasSceneSections) {
@@ -530,6 +547,10 @@ vcp_status vcp_view_get_look(vcp_view* view, vcp_look* look) {
 
 vcp_status vcp_view_set_look(vcp_view* view, const vcp_look* look) {
     return changing(view, [&](vcp_view& v) { return setLook(v, look); });
+}
+
+vcp_status vcp_view_set_environment(vcp_view* view, const char* source, float turn_degrees, float strength) {
+    return changing(view, [&](vcp_view& v) { return setEnvironment(v, source, turn_degrees, strength); });
 }
 
 vcp_status vcp_view_set_visible(vcp_view* view, uint32_t dataset, uint32_t visible) {

@@ -84,6 +84,7 @@ private:
     void layOutView();
     void layOutBookmarks();
     void layOutLight();
+    void layOutSurroundings();
     void layOutCut();
     void layOutMeasuring();
     void layOutMeasuredLine(size_t number);

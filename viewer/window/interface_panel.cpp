@@ -1,6 +1,8 @@
 // The panel at the right: what can be chosen, section by section.
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
+#include <vector>
 
 #include <fmt/format.h>
 #include <imgui.h>
@@ -172,7 +174,11 @@ void Interface::layOutLight() {
         shading.mode = static_cast<ShadingMode>(mode);
     // On files that are drawn without shadows, the switch does nothing.
     ImGui::BeginDisabled(!viewer.whyWithout(ViewerAction::ToggleShadows).empty());
+    // Surroundings alone cast none.
+    const bool isLit = std::ranges::any_of(lightsOf(shading), [](const DirectedLight& l) { return l.strength > 0; });
+    ImGui::BeginDisabled(!isLit);
     switchRow(*look_, "Shadows", shading.shadows, {"Light is cast from one side", "S"});
+    ImGui::EndDisabled();
     bool occlusion = shading.occlusionRays > 0;
     if (switchRow(*look_, "Ambient occlusion", occlusion, {"Corners and folds are darker", "O"}))
         shading.occlusionRays = occlusion ? kUsualOcclusionRays : 0;
@@ -180,6 +186,9 @@ void Interface::layOutLight() {
     bool follows = shading.lightFollowsCamera;
     const bool isTurned =
         switchRow(*look_, "Light follows the camera", follows, {"Ctrl + left drag turns the light", "L"});
+    if (shading != viewer.shading()) viewer.setShading(shading);
+    layOutSurroundings();
+    shading = viewer.shading();
     ImGui::AlignTextToFramePadding();
     text("Background");
     ImGui::SameLine(ImGui::GetCursorPosX() + ImGui::GetContentRegionAvail().x - units(56));
@@ -190,6 +199,30 @@ void Interface::layOutLight() {
     showTip(*look_, {"Below", ""});
     if (shading != viewer.shading()) viewer.setShading(shading);
     if (isTurned) session_->act(ViewerAction::ToggleLight);
+}
+
+void Interface::layOutSurroundings() {
+    static constexpr const char* kNames[] = {"No surroundings", "Studio", "Overcast sky", "Clear sky"};
+    static_assert(std::size(kNames) == kEnvironmentNames.size() + 1);
+    std::vector<const char*> names(std::begin(kNames), std::end(kNames));
+    const std::string source = session_->surroundings(), file = std::filesystem::path(source).filename().string();
+    const auto known = std::ranges::find(kEnvironmentNames, source);
+    int chosen = source.empty() ? 0 : int(known - kEnvironmentNames.begin()) + 1;
+    if (chosen == int(names.size())) names.push_back(file.c_str());
+    const Tip tip{"Light from all around; drop a picture of surroundings (.hdr, .exr) onto the window for its light",
+                  ""};
+    if (comboRow(*look_, "##surroundings", names, chosen, tip))
+        session_->surround(chosen == 0 ? "" : kEnvironmentNames[size_t(chosen) - 1]);
+    Shading shading = session_->viewer().shading();
+    if (!shading.environment) return;
+    // From -180 to 180.
+    float turn = std::remainder(shading.environment->turn, 360.0f);
+    ImGui::SetNextItemWidth(-1);
+    if (ImGui::SliderFloat("##turn", &turn, -180, 180, "turned by %.0f\xc2\xb0", kNoTyping)) {
+        shading.environment->turn = turn;
+        session_->viewer().setShading(shading);
+    }
+    showTip(*look_, {"Turns the surroundings, as Ctrl + left drag does", ""});
 }
 
 void Interface::layOutCut() {

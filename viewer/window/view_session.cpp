@@ -13,6 +13,7 @@
 #include "octree/io/output_file.h"
 #include "viewer/annotation/picture_canvas.h"
 #include "viewer/camera/camera_path.h"
+#include "viewer/scene/environment.h"
 #include "viewer/window/free_name.h"
 #include "viewer/window/theme.h"
 #include "viewer/window/thumbnails.h"
@@ -67,7 +68,12 @@ Result<std::unique_ptr<ViewSession>> ViewSession::create(const SessionOptions& o
 }
 
 ViewSession::ViewSession(const SessionOptions& options, std::unique_ptr<Viewer> viewer)
-    : options_(options), user_(options.user), viewer_(std::move(viewer)), seenLooks_(looks()), up_(options.render.up) {
+    : options_(options),
+      user_(options.user),
+      viewer_(std::move(viewer)),
+      seenLooks_(looks()),
+      up_(options.render.up),
+      environment_(options.render.environment) {
     note("");
     useThemesBackground();
 }
@@ -87,6 +93,7 @@ void ViewSession::endPick() {
 void ViewSession::open(std::vector<std::string> inputs) {
     if (inputs.empty()) return;
     dismissProblem();
+    if (inputs.size() == 1 && isEnvironmentName(inputs.front())) return surround(inputs.front());
     opening_.reset();
     preview_ = {};
     framed_.reset();
@@ -130,12 +137,12 @@ Result<void> ViewSession::show(OpenedScene open, const std::vector<std::string>&
     const bool hasOwnSections = viewer_->sections().empty() && !open.file.sections.empty();
     if (hasOwnSections) viewer_->setSections(open.file.sections);
     viewer_->setSectionCaps(std::max(options_.render.caps, hasOwnSections ? open.file.sectionCaps : Caps::None));
-    if (!open.file.lights.empty() || std::exchange(hasSceneLight_, false)) {
-        // The lights of one scene do not apply to the next.
+    // The light of one scene does not apply to the next.
+    if (std::exchange(hasSceneLight_, hasOwnLight(open)) || hasSceneLight_) {
         Shading shading = viewer_->shading();
-        hasSceneLight_ = !open.file.lights.empty();
-        setLights(shading, hasSceneLight_ ? open.file.lights : lightsOf(options_.render.shading));
+        setSceneLight(shading, open, options_.render.shading);
         viewer_->setShading(shading);
+        environment_ = open.file.environment.value_or(options_.render.environment);
     }
     cancelSaving();
     compared_.reset();
@@ -349,12 +356,30 @@ void ViewSession::goToPoint(size_t index) {
     viewer_->moveTo(camera);
 }
 
+void ViewSession::surround(const std::string& source) {
+    Shading shading = viewer_->shading();
+    if (source.empty()) {
+        shading.environment.reset();
+        if (shading.lightStrength == 0) shading.lightStrength = DirectedLight().strength;
+    } else {
+        const EnvironmentChoice choice{source, shading.environment ? shading.environment->turn : 0.0f, 1};
+        const auto light = openEnvironment(choice);
+        if (!light) return say(light.error().line());
+        environment_ = choice;
+        shading.environment = *light;
+        shading.lightStrength = 0;
+    }
+    viewer_->setShading(shading);
+}
+
 void ViewSession::saveScene() {
     if (!viewer_->isOpen()) return;
     if (std::ranges::any_of(scene_.datasets, [](const SceneDataset& each) { return each.file.empty(); }))
         return note("several meshes are shown as one: build a .vcp of them, which a scene can name");
     SceneFile scene = scene_;
     scene.lights = lightsOf(viewer_->shading());
+    if (const auto& light = viewer_->shading().environment)
+        scene.environment = EnvironmentChoice{environment_.source, light->turn, light->strength};
     scene.camera = viewer_->camera();
     scene.sections = viewer_->sections();
     scene.sectionCaps = viewer_->sectionCaps();

@@ -141,6 +141,14 @@ public:
     /// annotations; and reports it.
     void saveScene();
 
+    /// Lights what is shown by surroundings: one of kEnvironmentNames or a picture; empty: by the light alone again. An
+    /// error is shown.
+    void surround(const std::string& source);
+    /// Returns what the surroundings are; empty: there are none.
+    [[nodiscard]] std::string surroundings() const {
+        return viewer_->shading().environment ? environment_.source : std::string();
+    }
+
     /// Overlays of streaming; nothing is asked of the renderer for them while they are off.
     bool showsPages = false;
     [[nodiscard]] bool showsFeedback() const { return showsFeedback_; }
@@ -245,6 +253,7 @@ private:
     std::string shown_;             // rememberedName of what is shown; empty: nothing
     ShadingMode unwired_ = ShadingMode::Lit;  // the mode before the wireframe
     bool wasShown_ = false, showsFeedback_ = false, hasSceneLight_ = false;
+    EnvironmentChoice environment_;  // where the viewer's light from everywhere comes from
     std::string problem_, note_;
     double notedAt_;  // time of the update that saw the note first; not a number until then
     std::vector<Layer> layers_;

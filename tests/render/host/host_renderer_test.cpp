@@ -199,6 +199,23 @@ TEST_F(HostRendererTest, ShadowsAndOcclusion) {
     EXPECT_GT(darker, 5000u);
 }
 
+TEST_F(HostRendererTest, LightFromEverywhere) {
+    const test::BuiltMesh built = torusAndBox();
+    ASSERT_TRUE(built.ok());
+    open(built);
+    Difference all;
+    for (const NamedCamera& named : test::cameras(kLow, kHigh)) {
+        SCOPED_TRACE(named.name);
+        FrameRequest request = requestOf(named.camera);
+        request.shading.lightStrength = 0;
+        request.shading.environment = environmentNamed("studio");
+        request.shading.environment->turn = 70;
+        request.shading.occlusionRays = 2;
+        all += difference(request, built.cache().dataset().header.cell);
+    }
+    expectFew(all);
+}
+
 TEST_F(HostRendererTest, SixteenSamples) {
     const test::BuiltMesh built = torusAndBox();
     ASSERT_TRUE(built.ok());

@@ -134,6 +134,8 @@ TEST_F(HostSurfaces, ModesSectionsLightsTexturesAndFar) {
             request.shading.moreLights = {{false, {-0.5f, 0.4f, 0.3f}, 0.5f}, {true, {0, 0, 1}, 0.3f}};
         });
     }
+    SCOPED_TRACE("environment");
+    compared([&](FrameRequest& request) { request.shading.environment = environmentNamed("clear"); });
     SCOPED_TRACE("sections");
     compared([&](FrameRequest& request) {
         request.shading.shadows = true;

@@ -29,6 +29,7 @@ TEST(SceneFile, TheDocumentsExampleIsRead) {
     EXPECT_NEAR(glm::length(scene->lights[0].direction), 1, 1e-6);
     EXPECT_EQ(scene->lights[0].strength, 1);
     EXPECT_FLOAT_EQ(float(scene->lights[1].strength), 0.3f);
+    EXPECT_EQ(scene->environment, (EnvironmentChoice{"overcast", 30, 1}));
     ASSERT_TRUE(scene->camera);
     EXPECT_EQ(scene->camera->position, glm::dvec3(0, 0.2, 1.5));
     EXPECT_EQ(scene->sections, (std::vector<SectionPlane>{{{1, 0, 0}, 0.05}}));
@@ -77,6 +78,10 @@ TEST(SceneFile, WhatIsWrongIsSaidWithItsLine) {
         {beside("\"lights\": [{}, {}, {}, {}, {}]"), 3, "at most 4 lights"},
         {beside("\"lights\": [{\"direction\": [1, 0, 0], \"strength\": -1}]"), 3, "must be from 0 to 10"},
         {beside("\"lights\": [{}]"), 3, "direction"},
+        {beside("\"environment\": \"studio\""), 3, "environment"},
+        {beside("\"environment\": {\"turn_degrees\": 1}"), 3, "\"source\" is missing"},
+        {beside("\"environment\": {\"source\": \"studio\", \"strength\": 11}"), 3, "must be from 0 to 10"},
+        {beside("\"environment\": {\"source\": \"studio\", \"turn\": 1}"), 3, "turn"},
         {beside("\"caps\": 1"), 3, "true or false"},
         {beside("\"camera\": {\"position\": [0, 0, 0],\n \"target\": [0, 0, 0]}"), 4, "\"target\""},
         {beside("\"camera\": {\"position\": [0, 0, 0]}"), 3, "\"target\""},
@@ -141,6 +146,7 @@ TEST(SceneFile, WhatIsWrittenIsReadAgain) {
     surface.method.directions = {8, 12};
     surface.withBase = surface.withFar = false;
     scene.lights = {{true, glm::vec3(0.6f, 0, 0.8f), 1}, {false, glm::vec3(0, 1, 0), 0.25f}};
+    scene.environment = EnvironmentChoice{"/elsewhere/roof.hdr", -30, 0.5f};
     scene.camera = OrbitCamera();
     scene.camera->position = {1, 2, 30};
     scene.sections = {{{0, 0, -2}, -0.25}, {{1, 0.5, 0}, 7}};
@@ -187,6 +193,7 @@ TEST(SceneFile, WhatIsWrittenIsReadAgain) {
         EXPECT_LT(glm::distance(read->lights[i].direction, scene.lights[i].direction), 1e-6f);
         EXPECT_EQ(read->lights[i].strength, scene.lights[i].strength);
     }
+    EXPECT_EQ(read->environment, scene.environment);
     expectNear(read->camera->position, scene.camera->position);
     EXPECT_EQ(read->sections, scene.sections);
     EXPECT_EQ(read->sectionCaps, Caps::All);

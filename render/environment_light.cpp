@@ -1,0 +1,156 @@
+#include "render/environment_light.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include <glm/geometric.hpp>
+#include <glm/mat3x3.hpp>
+#include <glm/matrix.hpp>
+#include <glm/trigonometric.hpp>
+
+namespace vcp {
+
+namespace {
+
+constexpr double kPi = std::numbers::pi;
+// How bright each channel looks (ITU-R BT.709).
+constexpr glm::dvec3 kLuminance(0.2126, 0.7152, 0.0722);
+
+/// Integrals of radiance over all directions d: of 1, of d, and of d times d, for each channel.
+struct Moments {
+    glm::dvec3 zeroth{0};
+    std::array<glm::dvec3, 3> first{};
+    std::array<glm::dmat3, 3> second{};
+
+    void add(glm::dvec3 radiance, glm::dvec3 d, double solidAngle) {
+        zeroth += solidAngle * radiance;
+        for (int c = 0; c < 3; ++c) {
+            first[size_t(c)] += solidAngle * radiance[c] * d;
+            second[size_t(c)] += solidAngle * radiance[c] * glm::outerProduct(d, d);
+        }
+    }
+};
+
+/// Returns the direction of a point of the picture, each coordinate from 0 to 1, from the left and from the top.
+glm::dvec3 directionAt(double x, double y) {
+    const double across = 2 * kPi * (x - 0.5), down = kPi * y;
+    return {std::sin(down) * std::sin(across), std::sin(down) * std::cos(across), std::cos(down)};
+}
+
+/// Returns the forms of light that falls by the cosine. Its clamp, max(0, t), is 1/4 + t/2 + 5/32 (3 t t - 1) in the
+/// three bands that matter.
+EnvironmentLight lightOf(const Moments& moments) {
+    EnvironmentLight light;
+    for (size_t c = 0; c < 3; ++c) {
+        glm::dmat4 form(15.0 / 32 * moments.second[c]);
+        const glm::dvec3 half = 0.25 * moments.first[c];
+        form[3] = glm::dvec4(half, 3.0 / 32 * moments.zeroth[int(c)]);
+        for (int i = 0; i < 3; ++i) form[i][3] = half[i];
+        light.forms[c] = form / kPi;
+    }
+    return light;
+}
+
+/// Returns the luminance of the most light that a surface gets, to a percent.
+double mostLight(const EnvironmentLight& light) {
+    constexpr int kDirections = 2000;
+    double most = 0;
+    for (int i = 0; i < kDirections; ++i) {
+        const double z = 1 - (2 * i + 1.0) / kDirections, angle = i * kPi * (3 - std::sqrt(5.0));
+        const double r = std::sqrt(1 - z * z);
+        const glm::vec4 n(r * std::cos(angle), r * std::sin(angle), z, 1);
+        glm::dvec3 channels(0);
+        for (int c = 0; c < 3; ++c)
+            channels[c] = std::max(0.0, double(glm::dot(n, light.forms[size_t(c)] * n)));
+        most = std::max(most, glm::dot(channels, kLuminance));
+    }
+    return most;
+}
+
+/// Returns how much of a lamp is seen in a direction: 1 within `inner` of its middle, 0 beyond `outer`, radians.
+double lampAt(glm::dvec3 d, glm::dvec3 towards, double inner, double outer) {
+    const double angle = std::acos(std::clamp(glm::dot(d, glm::normalize(towards)), -1.0, 1.0));
+    const double t = std::clamp((outer - angle) / (outer - inner), 0.0, 1.0);
+    return t * t * (3 - 2 * t);
+}
+
+/// A large lamp in front on the left, a cool one on the right, and one behind above.
+glm::dvec3 studioAt(glm::dvec3 d) {
+    const glm::dvec3 wall = d.z < 0 ? glm::dvec3(0.16, 0.15, 0.14) : glm::dvec3(0.13 + 0.12 * d.z);
+    return wall + 3.2 * lampAt(d, {-0.7, -0.7, 0.75}, 0.35, 0.7) * glm::dvec3(1.0, 0.96, 0.9) +
+           1.1 * lampAt(d, {0.9, -0.45, 0.2}, 0.4, 0.8) * glm::dvec3(0.8, 0.9, 1.0) +
+           2.4 * lampAt(d, {0.3, 0.9, 0.6}, 0.25, 0.5) * glm::dvec3(1.0);
+}
+
+/// The sky of Moon and Spencer (the CIE's overcast one), above ground that gives back a fifth of its light.
+glm::dvec3 overcastAt(glm::dvec3 d) {
+    return d.z < 0 ? glm::dvec3(0.155, 0.150, 0.140) : (1 + 2 * d.z) / 3 * glm::dvec3(0.97, 0.99, 1.0);
+}
+
+/// Blue, paler towards the horizon, with the sun and its halo in front on the left; above sunlit ground.
+glm::dvec3 clearAt(glm::dvec3 d) {
+    if (d.z < 0) return {0.36, 0.33, 0.28};
+    const glm::dvec3 sun(-0.5, -0.55, 0.62);
+    const glm::dvec3 sky = glm::mix(glm::dvec3(0.62, 0.72, 0.85), glm::dvec3(0.16, 0.33, 0.72), std::sqrt(d.z));
+    return sky + glm::dvec3(1.0, 0.9, 0.74) * (22.0 * lampAt(d, sun, 0.1, 0.3) + 0.5 * lampAt(d, sun, 0.1, 1.0));
+}
+
+template <class Radiance>
+EnvironmentLight lightOfAll(Radiance radiance) {
+    constexpr uint32_t kWidth = 256, kHeight = 128;
+    std::vector<glm::vec3> picture;
+    for (uint32_t y = 0; y < kHeight; ++y)
+        for (uint32_t x = 0; x < kWidth; ++x)
+            picture.emplace_back(radiance(directionAt((x + 0.5) / kWidth, (y + 0.5) / kHeight)));
+    return *environmentLight(picture, {kWidth, kHeight});
+}
+
+/// Returns the smallest turn that brings a unit vector to the axis z.
+glm::dquat turnToZ(glm::dvec3 v) {
+    if (v.z < -1 + 1e-12) return {0, 1, 0, 0};
+    return glm::normalize(glm::dquat(1 + v.z, glm::cross(v, glm::dvec3(0, 0, 1))));
+}
+
+}  // namespace
+
+std::optional<EnvironmentLight> environmentLight(std::span<const glm::vec3> radiance, glm::uvec2 size) {
+    Moments moments;
+    for (uint32_t y = 0; y < size.y; ++y) {
+        const double ring = std::cos(kPi * y / size.y) - std::cos(kPi * (y + 1.0) / size.y);
+        for (uint32_t x = 0; x < size.x; ++x)
+            moments.add(radiance[size_t{y} * size.x + x], directionAt((x + 0.5) / size.x, (y + 0.5) / size.y),
+                        ring * 2 * kPi / size.x);
+    }
+    EnvironmentLight light = lightOf(moments);
+    const double most = mostLight(light);
+    if (!(most > 0) || !std::isfinite(most)) return std::nullopt;
+    for (glm::mat4& form : light.forms) form /= float(most);
+    return light;
+}
+
+std::optional<EnvironmentLight> environmentNamed(std::string_view name) {
+    if (name == "studio") return lightOfAll(studioAt);
+    if (name == "overcast") return lightOfAll(overcastAt);
+    if (name == "clear") return lightOfAll(clearAt);
+    return std::nullopt;
+}
+
+std::array<glm::vec4, 9> environmentRows(const EnvironmentLight& light, const glm::dquat& worldFromDataset) {
+    const glm::dquat back = glm::angleAxis(-glm::radians(double(light.turn)), glm::dvec3(0, 0, 1));
+    const glm::dmat3 toOwn = glm::mat3_cast(back * turnToZ(light.up) * worldFromDataset);
+    std::array<glm::vec4, 9> rows{};
+    for (int c = 0; c < 3; ++c) {
+        const glm::dmat4 form = double(light.strength) * glm::dmat4(light.forms[size_t(c)]);
+        const glm::dmat3 q = glm::transpose(toOwn) * glm::dmat3(form) * toOwn;
+        const glm::dvec3 twice = 2.0 * (glm::transpose(toOwn) * glm::dvec3(form[3]));
+        // z z is 1 - x x - y y.
+        const double values[] = {form[3][3] + q[2][2], twice.x,     twice.y,           twice.z,          2 * q[0][1],
+                                 2 * q[1][2],          2 * q[2][0], q[0][0] - q[2][2], q[1][1] - q[2][2]};
+        for (size_t i = 0; i < rows.size(); ++i) rows[i][c] = float(values[i]);
+    }
+    return rows;
+}
+
+}  // namespace vcp
