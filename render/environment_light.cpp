@@ -62,8 +62,7 @@ double mostLight(const EnvironmentLight& light) {
         const double r = std::sqrt(1 - z * z);
         const glm::vec4 n(r * std::cos(angle), r * std::sin(angle), z, 1);
         glm::dvec3 channels(0);
-        for (int c = 0; c < 3; ++c)
-            channels[c] = std::max(0.0, double(glm::dot(n, light.forms[size_t(c)] * n)));
+        for (int c = 0; c < 3; ++c) channels[c] = std::max(0.0, double(glm::dot(n, light.forms[size_t(c)] * n)));
         most = std::max(most, glm::dot(channels, kLuminance));
     }
     return most;

@@ -1,8 +1,8 @@
 // Light from everywhere: what comes from surroundings so far away that only the direction counts.
 //
-// The light on a surface is a smooth function of its normal, whatever the surroundings are: a quadratic form holds it to
-// within about 1 % of the mean (Ramamoorthi and Hanrahan 2001, "An Efficient Representation for Irradiance Environment
-// Maps"). So a picture of any size becomes 27 numbers, and a turn of it costs nothing.
+// The light on a surface is a smooth function of its normal, whatever the surroundings are: a quadratic form holds it
+// to within about 1 % of the mean (Ramamoorthi and Hanrahan 2001, "An Efficient Representation for Irradiance
+// Environment Maps"). So a picture of any size becomes 27 numbers, and a turn of it costs nothing.
 #pragma once
 
 #include <array>

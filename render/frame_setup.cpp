@@ -198,7 +198,8 @@ frame::FrameConstants frameConstants(const FrameRequest& request, const Dataset*
     c.rotation = glm::vec4(glm::dvec4(q.x, q.y, q.z, q.w));
     if (request.shading.environment) {
         c.hasEnvironment = 1;
-        std::ranges::copy(environmentRows(*request.shading.environment, q), c.environment);
+        const auto rows = environmentRows(*request.shading.environment, q);
+        std::copy(rows.begin(), rows.end(), c.environment);
     }
     setSections(c, request, header);
     setLight(c, request, header, basis, dataset != nullptr ? errorToLift(*dataset, request, errorPixels) : 0);

@@ -75,7 +75,10 @@ void setPicture(frame::MesoView& view, glm::dvec3 origin, const FrameRequest& re
         view.lights[view.lightCount++] = glm::vec4(glm::vec3(towardsLight(light, basis)), light.strength);
     view.up = lightDirections(request, basis).sky;
     view.hasEnvironment = request.shading.environment ? 1 : 0;
-    if (request.shading.environment) std::ranges::copy(environmentRows(*request.shading.environment), view.environment);
+    if (request.shading.environment) {
+        const auto rows = environmentRows(*request.shading.environment);
+        std::copy(rows.begin(), rows.end(), view.environment);
+    }
     view.strayPixels = float(request.errorPixels), view.farShadows = request.shading.shadows ? 1 : 0;
     view.shows = shownIn(request.shading.mode);
 }

@@ -26,7 +26,8 @@ constexpr uint64_t kMostTexels = uint64_t{kMostEdge} * kMostEdge / 2;
 /// for black.
 class HdrReader {
 public:
-    explicit HdrReader(std::span<const std::byte> file) : left_(reinterpret_cast<const char*>(file.data()), file.size()) {}
+    explicit HdrReader(std::span<const std::byte> file)
+        : left_(reinterpret_cast<const char*>(file.data()), file.size()) {}
 
     Result<RadiancePicture> read() {
         bool isRgbe = true;
@@ -83,8 +84,8 @@ private:
         const uint32_t width = picture_.size.x;
         row_.assign(size_t{width} * 4, 0);
         const auto at = [&](size_t i) { return i < left_.size() ? uint8_t(left_[i]) : 255u; };
-        const bool isOfPlanes = width >= 8 && width < 32768 && at(0) == 2 && at(1) == 2 && at(2) == width >> 8 &&
-                                at(3) == (width & 255);
+        const bool isOfPlanes =
+            width >= 8 && width < 32768 && at(0) == 2 && at(1) == 2 && at(2) == width >> 8 && at(3) == (width & 255);
         if (isOfPlanes) left_.remove_prefix(4);
         if (!(isOfPlanes ? readPlanes() : readTexels())) return false;
         for (uint32_t x = 0; x < width; ++x) {
