@@ -73,6 +73,9 @@ export const kMarkup = `
     <button data-do="full" title="Full screen" aria-label="Full screen"><span class="corners"></span></button>
 </div>
 <div class="panel" role="group" aria-label="Light and section" hidden>
+    <span>Around</span><select data-set="environment" aria-label="Surroundings that light the scan">
+        <option value="">a light</option><option value="studio">studio</option>
+        <option value="overcast">overcast sky</option><option value="clear">clear sky</option></select>
     <span>Side</span><input type="range" data-set="side" aria-label="Side of the light, degrees" min="-180" max="180">
     <span>Height</span><input type="range" data-set="above" aria-label="Height of the light, degrees" min="-90" max="90">
     <div class="wide"><label><input type="checkbox" data-set="shadows">Shadows</label>

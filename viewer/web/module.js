@@ -112,13 +112,15 @@ export class Module {
     }
     /// `view`: eye, forward, up, fov (radians, from the lower to the upper edge), width, height; what is left out below
     /// is as here. `light`: towards it, in the camera's axes (right, up, back). `section`: { normal, offset }: what has
-    /// dot(normal, x) >= offset is kept.
+    /// dot(normal, x) >= offset is kept. `environment`: 0, or 1 + the number of surroundings (studio, overcast, clear) in
+    /// place of the light. `upright`: the axis that points up.
     look(view) {
         const { eye, forward, up, fov, width, height, errorPixels = 0.5, mode = 0, shadows = false, occlusionRays = 0,
-            top = [0, 0, 0], bottom = [0, 0, 0], light = [-0.35, 0.55, 0.75], section = null } = view;
+            top = [0, 0, 0], bottom = [0, 0, 0], light = [-0.35, 0.55, 0.75], section = null, environment = 0,
+            upright = [0, 1, 0] } = view;
         const cut = section ? [1, ...section.normal, section.offset] : [0, 0, 0, 0, 0];
         const numbers = [...eye, ...forward, ...up, fov, width, height, errorPixels, mode, Number(shadows), occlusionRays,
-            ...top, ...bottom, ...light, ...cut];
+            ...top, ...bottom, ...light, ...cut, environment, ...upright];
         this.with(new Float64Array(numbers), at => this.wasm.vcp_look(at));
     }
     update() {

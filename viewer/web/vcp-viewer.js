@@ -3,6 +3,7 @@ import { Light, Orbit, kFieldOfView, difference, length, movingScale, sectionOf 
 import { kMarkup, kStyle } from './markup.js';
 
 const kModes = { lit: 0, clay: 1, unlit: 2, normals: 3, level: 7, error: 8, wireframe: 9 };
+const kEnvironments = ['studio', 'overcast', 'clear'];
 const kMovingScale = 0.4; // of the resolution, while the view moves for the first time
 const kOcclusionRays = 8; // a pixel
 const kRestMs = 160; // without a movement: the view is at rest
@@ -41,7 +42,8 @@ function measureText(x, error) {
 }
 
 export class VcpViewer extends HTMLElement {
-    static observedAttributes = ['src', 'mode', 'annotations', 'theme', 'light', 'shadows', 'occlusion', 'section', 'up'];
+    static observedAttributes = ['src', 'mode', 'annotations', 'theme', 'light', 'environment', 'shadows', 'occlusion', 'section',
+        'up'];
 
     constructor() {
         super();
@@ -109,12 +111,18 @@ export class VcpViewer extends HTMLElement {
         else this.look(false);
     }
 
+    /// Of what lights the scan: 0, or 1 + the number of surroundings.
+    get environment() { return 1 + kEnvironments.indexOf(this.getAttribute('environment')); }
+
     /// Sets the controls to what is shown.
     showControls() {
         this.parts.select.value = this.mode;
         const control = name => this.parts.panel.querySelector(`[data-set="${name}"]`);
         control('side').value = this.light.side;
         control('above').value = this.light.above;
+        const isAround = this.environment > 0;
+        control('environment').value = isAround ? this.getAttribute('environment') : '';
+        for (const name of ['side', 'above', 'shadows']) control(name).disabled = isAround;
         control('shadows').checked = this.hasAttribute('shadows');
         control('occlusion').checked = this.hasAttribute('occlusion');
         const [axis, place] = (this.getAttribute('section') ?? ',0.5').split(',');
@@ -127,6 +135,8 @@ export class VcpViewer extends HTMLElement {
         const { panel } = this.parts, value = name => panel.querySelector(`[data-set="${name}"]`).value;
         const what = control.dataset.set;
         if (what === 'shadows' || what === 'occlusion') this.toggleAttribute(what, control.checked);
+        else if (what === 'environment' && control.value === '') this.removeAttribute(what);
+        else if (what === 'environment') this.setAttribute(what, control.value);
         else if (what === 'side' || what === 'above') this.setAttribute('light', `${value('side')},${value('above')}`);
         else if (value('axis') === '') this.removeAttribute('section');
         else this.setAttribute('section', `${value('axis')},${value('place') / 100}`);
@@ -267,6 +277,8 @@ export class VcpViewer extends HTMLElement {
             shadows: this.hasAttribute('shadows'),
             occlusionRays: this.hasAttribute('occlusion') && !moving ? kOcclusionRays : 0,
             top: theme.top, bottom: theme.bottom, light: this.light.direction(),
+            environment: this.environment,
+            upright: this.orbit.up === 'z' ? [0, 0, 1] : [0, 1, 0],
             section: sectionOf(this.getAttribute('section'), this.info.boundsMin, this.info.boundsMax),
         });
         this.drawOver();

@@ -129,7 +129,7 @@ await check('bands cast from copies are those of the pool; no more is copied tha
     let pagesLeftOut = 0, partsLeft = 0;
     for (const shareBytes of [64 << 20, 500e3]) {
         const other = await CasterHere.beside(module, shareBytes);
-        for (const more of [{}, { mode: 7 }, { shadows: true }, { occlusionRays: 4 }, { section }]) for (const nearer of [1, 0.3]) {
+        for (const more of [{}, { mode: 7 }, { shadows: true }, { occlusionRays: 4 }, { section }, { environment: 2 }]) for (const nearer of [1, 0.3]) {
             const orbit = new Orbit();
             orbit.fit(info.boundsMin, info.boundsMax, 1.6);
             orbit.zoom(nearer, 0.2, 0.3);

@@ -127,7 +127,8 @@ async function looks(width, height, touch) {
 async function lights() {
     const page = await open(320, 200);
     let before = await shown(page);
-    for (const [name, value] of [['light', '60,20'], ['shadows', ''], ['occlusion', ''], ['section', '-x,0.5'], ['mode', 'clay']]) {
+    for (const [name, value] of [['light', '60,20'], ['shadows', ''], ['occlusion', ''], ['section', '-x,0.5'], ['environment', 'studio'],
+        ['mode', 'clay']]) {
         await change(page, `viewer.setAttribute('${name}', '${value}')`);
         const now = await shown(page);
         assert.notEqual(now, before, name);

@@ -4,15 +4,18 @@
 // Numbers cross as doubles, which hold every size of a file below 2^53. A call that can fail returns a negative number
 // then, and vcp_error() the line that says why.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
 #include <iterator>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "octree/dataset_reader.h"
+#include "render/environment_light.h"
 #include "render/frame_setup.h"
 #include "render/host_drawing.h"
 #include "render/pages/host_page_memory.h"
@@ -215,10 +218,24 @@ EXPORT(vcp_info) const double* vcp_info() {
     return opened.numbers;
 }
 
+/// Lights by the environment before `number`, or by the light alone where it is 0.
+void setEnvironment(Shading& shading, size_t number, glm::vec3 up) {
+    static std::array<std::optional<EnvironmentLight>, kEnvironmentNames.size()> lights;
+    shading.environment.reset();
+    shading.lightStrength = DirectedLight().strength;
+    if (number == 0 || number > lights.size()) return;
+    auto& light = lights[number - 1];
+    if (!light) light = environmentNamed(kEnvironmentNames[number - 1]);
+    shading.environment = light;
+    shading.environment->up = up;
+    shading.lightStrength = 0;
+}
+
 /// Sets what is to be drawn: eye, forward, up (three numbers each), vertical field of view, width, height, error in
 /// pixels, ShadingMode, shadows, rays of ambient occlusion, background at the top and at the bottom (three each),
 /// direction towards the light in the camera's axes (right, up, back), whether there is a section, its normal (three)
-/// and offset.
+/// and offset, 0 or 1 + the number of an environment (kEnvironmentNames) in place of the light, and the axis that
+/// points up (three).
 EXPORT(vcp_look) void vcp_look(const double* from) {
     FrameRequest& request = opened.request;
     request.camera.eye = {from[0], from[1], from[2]};
@@ -234,6 +251,7 @@ EXPORT(vcp_look) void vcp_look(const double* from) {
     request.shading.backgroundTop = {from[16], from[17], from[18]};
     request.shading.backgroundBottom = {from[19], from[20], from[21]};
     request.shading.lightDirection = {from[22], from[23], from[24]};
+    setEnvironment(request.shading, size_t(from[30]), {from[31], from[32], from[33]});
     request.sections.clear();
     if (from[25] != 0) request.sections.push_back({{from[26], from[27], from[28]}, from[29]});
     request.sectionCaps = from[25] != 0 ? Caps::Closed : Caps::None;
