@@ -7,6 +7,7 @@
 #include <map>
 #include <numeric>
 #include <optional>
+#include <tuple>
 
 #include <oneapi/tbb/parallel_for.h>
 
@@ -28,9 +29,12 @@ constexpr size_t kTilesAtOnce = 64;
 // What images take in a file, of what their own files take: JPEGs with their coarser levels, and PNGs.
 constexpr double kStoredOfJpeg = 1.5, kStoredOfPng = 0.9;
 
-/// Names an image by where it comes from: it is decoded once for all materials that have it.
-using ImageKey = std::pair<std::filesystem::path, const std::string*>;
-ImageKey keyOf(const ImageSource& source) { return {source.path, source.bytes.get()}; }
+/// Names an image by where it comes from, and whether its alpha counts: it is decoded once for all materials that have
+/// it.
+using ImageKey = std::tuple<std::filesystem::path, const std::string*, bool>;
+ImageKey keyOf(const Material& material) {
+    return {material.image.path, material.image.bytes.get(), material.ignoresAlpha};
+}
 
 ImageWrap storedWrap(Wrap wrap) {
     return wrap == Wrap::Clamp ? ImageWrap::Clamp : wrap == Wrap::Mirror ? ImageWrap::Mirror : ImageWrap::Repeat;
@@ -100,6 +104,7 @@ Result<std::optional<SourceImage>> loadSource(const Material& material, bool wit
     limits.bytes = std::min(limits.bytes, most);
     const auto file = imageFile(material.image, limits);
     auto image = file ? decodeImage(material.image, **file, limits) : file.error();
+    if (image && material.ignoresAlpha) ignoreAlpha(*image);
     if (image)
         return std::optional(SourceImage{Texture(*std::move(image), material.wrapU, material.wrapV),
                                          withBlocks ? JpegBlocks::read(**file) : nullptr});
@@ -122,7 +127,7 @@ Result<std::vector<PlacedMaterial>> storeImages(std::span<const Material> materi
     for (size_t i = 0; i < materials.size(); ++i) {
         const Material& material = materials[i];
         if (!material.image.exists()) continue;
-        const auto [number, isNew] = numbers.try_emplace(keyOf(material.image));
+        const auto [number, isNew] = numbers.try_emplace(keyOf(material));
         if (isNew) {
             if (!progress(double(i) / double(materials.size()))) return Error::cancelled();
             const auto loaded = loadSource(material, options.imageQuality.finest != 0, imageBytes);
@@ -164,7 +169,7 @@ uint64_t expectedImageBytes(std::span<const Material> materials) {
                                                : std::filesystem::file_size(material.image.path, missing);
         const bool isPng = material.image.bytes ? material.image.bytes->starts_with("\x89PNG")
                                                 : material.image.path.extension() == ".png";
-        bytes[keyOf(material.image)] = missing ? 0 : (isPng ? kStoredOfPng : kStoredOfJpeg) * double(size);
+        bytes[keyOf(material)] = missing ? 0 : (isPng ? kStoredOfPng : kStoredOfJpeg) * double(size);
     }
     return uint64_t(std::accumulate(bytes.begin(), bytes.end(), 0.0,
                                     [](double sum, const auto& image) { return sum + image.second; }));

@@ -156,6 +156,19 @@ Result<std::shared_ptr<const std::string>> imageFile(const ImageSource& source, 
     return std::shared_ptr<const std::string>(std::move(file));
 }
 
+void ignoreAlpha(Image& image) {
+    for (Rgba8& texel : image.texels) texel |= Rgba8{255} << 24;
+}
+
+bool mayBeTransparent(const ImageSource& source) {
+    if (source.bytes) return mayHaveAlpha(*source.bytes);
+    constexpr size_t kStartBytes = 64 * 1024;
+    const auto file = openRandomBytes(source.path);
+    if (!file) return false;
+    std::string start(std::min<uint64_t>((*file)->size(), kStartBytes), '\0');
+    return (*file)->read(0, start.data(), start.size()) && mayHaveAlpha(start);
+}
+
 Result<Image> decodeImage(const ImageSource& source, const std::string& file, const ImageLimits& limits) {
     auto image = decodeImage(file, limits);
     return image || source.bytes ? std::move(image) : named(source, image.error());

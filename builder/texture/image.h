@@ -33,6 +33,12 @@ Result<Image> decodeImage(std::string_view file, const ImageLimits& limits = {})
 /// Reads the file that `source` names, or returns its bytes. Errors: Io, Limit (too large); with the file's name.
 Result<std::shared_ptr<const std::string>> imageFile(const ImageSource& source, const ImageLimits& limits = {});
 
+/// Makes all texels opaque.
+void ignoreAlpha(Image& image);
+
+/// Whether an image may have texels that are not opaque, by the start of its file. False where it cannot be read.
+bool mayBeTransparent(const ImageSource& source);
+
 /// Reads and decodes it. Errors: as imageFile() and decodeImage(); with the file's name.
 Result<Image> loadImage(const ImageSource& source, const ImageLimits& limits = {});
 /// Decodes what imageFile() returned of `source`. Errors: as decodeImage(); with the file's name.

@@ -66,6 +66,21 @@ Result<PngChunks> checkPng(std::string_view file) {
     return chunks;
 }
 
+bool mayHaveAlpha(std::string_view start) {
+    if (!start.starts_with("\x89PNG")) return false;
+    // The last chunk need not be whole.
+    for (uint64_t at = kSignatureBytes; at + kFrameBytes <= start.size(); at += wordAt(start, at) + kFrameBytes) {
+        const std::string_view name = start.substr(at + 4, 4);
+        constexpr uint64_t kColourType = 17;
+        // Grey with alpha, and colour with alpha.
+        if (name == "IHDR" && at + kColourType < start.size())
+            if (const char type = start[at + kColourType]; type == 4 || type == 6) return true;
+        if (name == "tRNS") return true;
+        if (name == "IDAT") return false;
+    }
+    return true;
+}
+
 std::string withoutText(std::string_view file) {
     std::string kept(file.substr(0, kSignatureBytes));
     std::vector<std::string_view> had;

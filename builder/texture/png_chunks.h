@@ -21,6 +21,9 @@ struct PngChunks {
 /// one).
 Result<PngChunks> checkPng(std::string_view file);
 
+/// Whether the start of a file is that of a PNG whose texels may be transparent, as far as it says.
+bool mayHaveAlpha(std::string_view start);
+
 /// Returns the file with only those chunks that say something about texels, each once. Text is left out: libpng would
 /// inflate up to 8 MB of it from 8 KB, a thousand times. Chunks that are not understood stay for libpng to refuse.
 std::string withoutText(std::string_view file);
