@@ -69,6 +69,8 @@ ByteImage halved(const ByteImage& fine) {
 
 bool mayBeHalved(const ByteImage& image) { return std::min(image.width, image.height) >= 2 * kLeastEdge; }
 
+uint8_t bitOf(uint8_t alpha, double cutoff) { return alpha < cutoff ? AlphaMask::kCut : AlphaMask::kKept; }
+
 /// Returns an image whose bits say what blocks of `edge` x `edge` values have. `bitsOf`: of a value.
 template <class BitsOf>
 ByteImage blocksOf(const ByteImage& fine, uint32_t edge, BitsOf bitsOf) {
@@ -85,8 +87,7 @@ ByteImage blocksOf(const ByteImage& fine, uint32_t edge, BitsOf bitsOf) {
 
 AlphaMask::AlphaMask(ByteImage alpha, double cutoff, Wrap wrapU, Wrap wrapV)
     : cutoff_(cutoff), wrapU_(wrapU), wrapV_(wrapV) {
-    contents_.push_back(
-        blocksOf(alpha, kBlockEdge, [&](uint8_t value) { return value < cutoff ? uint8_t{kCut} : uint8_t{kKept}; }));
+    contents_.push_back(blocksOf(alpha, kBlockEdge, [&](uint8_t value) { return bitOf(value, cutoff); }));
     while (contents_.back().values.size() > 1)
         contents_.push_back(blocksOf(contents_.back(), 2, [](uint8_t content) { return content; }));
     levels_.push_back(std::move(alpha));
@@ -121,19 +122,20 @@ AlphaMask::Content AlphaMask::contentOf(glm::dvec2 low, glm::dvec2 high) const {
     for (const Shown* each : {&columns, &rows})
         for (size_t r = 0; r < each->count; ++r)
             longest = std::max(longest, each->ranges[r].last - each->ranges[r].first);
-    constexpr uint32_t kBlocks = 4;  // that are looked at along an edge
+    const auto contentIn = [&](const ByteImage& image, uint32_t edge, auto bitsOf) {
+        uint8_t content = kNothing;
+        for (size_t r = 0; r < rows.count; ++r)
+            for (size_t c = 0; c < columns.count; ++c)
+                for (uint32_t y = rows.ranges[r].first / edge; y <= rows.ranges[r].last / edge; ++y)
+                    for (uint32_t x = columns.ranges[c].first / edge; x <= columns.ranges[c].last / edge; ++x)
+                        content |= bitsOf(image.values[size_t{y} * image.width + x]);
+        return Content(content);
+    };
+    constexpr uint32_t kMost = 4;  // texels or blocks that are looked at along an edge
+    if (longest <= kMost) return contentIn(levels_[0], 1, [&](uint8_t value) { return bitOf(value, cutoff_); });
     uint32_t level = 0;
-    while (level + 1 < contents_.size() && longest / (kBlockEdge << level) >= kBlocks) ++level;
-    const ByteImage& blocks = contents_[level];
-    uint8_t content = kNothing;
-    for (size_t r = 0; r < rows.count; ++r)
-        for (size_t c = 0; c < columns.count; ++c)
-            for (uint32_t y = rows.ranges[r].first / (kBlockEdge << level);
-                 y <= rows.ranges[r].last / (kBlockEdge << level); ++y)
-                for (uint32_t x = columns.ranges[c].first / (kBlockEdge << level);
-                     x <= columns.ranges[c].last / (kBlockEdge << level) && content != kBoth; ++x)
-                    content |= blocks.values[size_t{y} * blocks.width + x];
-    return Content(content);
+    while (level + 1 < contents_.size() && longest / (kBlockEdge << level) >= kMost) ++level;
+    return contentIn(contents_[level], kBlockEdge << level, [](uint8_t content) { return content; });
 }
 
 namespace {

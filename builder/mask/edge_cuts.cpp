@@ -13,8 +13,6 @@ namespace vcp {
 
 namespace {
 
-constexpr double kStepsPerTexel = 1.5;
-
 /// Finds cuts at one level of the mask.
 class EdgeWalk {
 public:
@@ -54,7 +52,10 @@ private:
             visit(begin, middle, first, margin);
             visit(middle, end, margin, last);
         } else if ((first >= 0) != (last >= 0)) {
-            const double at = (begin + crossingBetween(first, last)) / steps_;
+            const glm::dvec2 a = placeOf(begin), b = placeOf(end);
+            const double part =
+                crossingBetween(first, last, [&](double along) { return mask_.marginAt(a + (b - a) * along, level_); });
+            const double at = (begin + part) / steps_;
             found_.cuts.push_back(int32_t(std::ldexp(at, Weights::kLog2One)));
         }
     }
@@ -68,15 +69,9 @@ private:
 
 }  // namespace
 
-double crossingBetween(double first, double second) {
-    constexpr double kLeast = 1.0 / 64;
-    if ((first >= 0) == (second >= 0)) return 0.5;
-    return std::clamp(first / (first - second), kLeast, 1 - kLeast);
-}
-
 int log2StepsOf(double texels) {
     int log2 = 0;
-    while (log2 < EdgeCuts::kMostLog2Steps && std::ldexp(1.0, log2) < kStepsPerTexel * texels) ++log2;
+    while (log2 < EdgeCuts::kMostLog2Steps && std::ldexp(1.0, log2) < texels) ++log2;
     return log2;
 }
 

@@ -1,6 +1,7 @@
 // What a mask keeps of an edge of a triangle: a function of the edge alone, whichever triangle has it.
 #pragma once
 
+#include <algorithm>
 #include <optional>
 #include <vector>
 
@@ -29,11 +30,24 @@ struct EdgeCuts {
 /// the mask's coarsest level, or too far apart for it.
 std::optional<EdgeCuts> cutsBetween(const AlphaMask& mask, glm::dvec2 from, glm::dvec2 to);
 
-/// Returns where a value that goes from `first` to `second` passes 0, as a part of the way; not too close to either
-/// end, so that points stay apart. Where both are on one side, whatever else says that they are not counts: the middle.
-double crossingBetween(double first, double second);
+/// Returns where the outline crosses a step, whose ends have these margins (AlphaMask), as a part of the way: not too
+/// close to either end, so that points stay apart. Where both ends are on one side, though an edge of the triangle says
+/// otherwise: the middle. `marginAt`: of a part of the way.
+template <class MarginAt>
+double crossingBetween(double first, double last, MarginAt marginAt) {
+    if ((first >= 0) == (last >= 0)) return 0.5;
+    double begin = 0, end = 1;
+    for (int halvings = 0; halvings < 3; ++halvings) {
+        const double middle = (begin + end) / 2, margin = marginAt(middle);
+        const bool isLikeFirst = (margin >= 0) == (first >= 0);
+        (isLikeFirst ? begin : end) = middle;
+        (isLikeFirst ? first : last) = margin;
+    }
+    constexpr double kLeast = 1.0 / 64;
+    return std::clamp(begin + (end - begin) * first / (first - last), kLeast, 1 - kLeast);
+}
 
-/// Steps that a length of so many texels is cut into, so that none is longer than two thirds of one.
+/// Returns the binary logarithm of how many steps a length of so many texels is cut into, so that none is longer.
 int log2StepsOf(double texels);
 
 }  // namespace vcp

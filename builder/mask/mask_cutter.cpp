@@ -5,6 +5,7 @@
 #include <utility>
 
 #include <glm/common.hpp>
+#include <glm/geometric.hpp>
 
 #include "builder/mask/mask_outline.h"
 #include "builder/mask/triangulation.h"
@@ -28,10 +29,11 @@ std::optional<MaskParts> cutTriangle(const AlphaMask& mask, const std::array<glm
     auto outline = MaskOutline::find(mask, texels);
     if (!outline || outline->isWhole()) return std::nullopt;
     const size_t most = mostPartsOf(texels);
+    const double longest = glm::distance(texels[0], texels[1]) + glm::distance(texels[0], texels[2]);
     // Lines that cross make more than is known before.
     for (double tolerance = outline->leastTolerance();; tolerance *= 2) {
         outline->simplify(tolerance);
-        const bool isCoarsest = tolerance > kFarthestTexel;
+        const bool isCoarsest = tolerance > longest;
         if (outline->triangles() > most && !isCoarsest) continue;
         if (outline->isWhole()) return std::nullopt;
         MaskParts parts = triangulate(outline->loops());

@@ -145,8 +145,10 @@ private:
     }
 
     [[nodiscard]] Weights pointBetween(const Sample& a, const Sample& b) const {
-        const double part = crossingBetween(a.margin, b.margin);
         const Weights first = weightsOf(a.place), second = weightsOf(b.place);
+        const glm::dvec2 from = placeOf(texels_, first), to = placeOf(texels_, second);
+        const double part = crossingBetween(
+            a.margin, b.margin, [&](double along) { return mask_.marginAt(from + (to - from) * along, level_); });
         Weights w{};
         for (int k = 1; k < 3; ++k) w.of[k] = first.of[k] + int32_t(part * (second.of[k] - first.of[k]));
         w.of[0] = Weights::kOne - w.of[1] - w.of[2];
@@ -279,6 +281,23 @@ void markNeeded(const std::vector<glm::dvec2>& at, size_t first, size_t last, do
     }
 }
 
+/// Returns which point between two is farthest from the line that they end; the last where there is none.
+size_t farthestFrom(const std::vector<glm::dvec2>& at, size_t first, size_t last) {
+    size_t which = std::min(first + 1, last);
+    for (size_t k = first + 1; k < last; ++k)
+        if (distanceToSegment(at[k], at[first], at[last]) > distanceToSegment(at[which], at[first], at[last]))
+            which = k;
+    return which;
+}
+
+/// Whether a chain comes back to the edge that it left. It must not fall into the edge, where the triangle beyond may
+/// keep its own, and so has the chain's ends as corners.
+bool areOnOneEdge(const MaskLoop::Point& a, const MaskLoop::Point& b) {
+    for (int k = 0; k < 3; ++k)
+        if (a.isFixed && b.isFixed && a.weights.of[k] == 0 && b.weights.of[k] == 0) return true;
+    return false;
+}
+
 /// Simplifying takes time as the square of the points between two that stay: at least each so many-th does.
 constexpr size_t kLongestRun = 512;
 
@@ -299,6 +318,7 @@ std::vector<MaskLoop::Point> simplified(std::vector<MaskLoop::Point> points, con
     }
     for (size_t first = 0, k = 1; k <= count; ++k)
         if (stays[k]) {
+            if (areOnOneEdge(points[first], points[k % count])) stays[farthestFrom(at, first, k)] = 1;
             markNeeded(at, first, k, tolerance, stays);
             first = k;
         }
@@ -324,7 +344,7 @@ std::optional<MaskOutline> MaskOutline::find(const AlphaMask& mask, const Texels
     int log2 = log2StepsOf(longest);
     uint32_t level = 0;
     while (std::ldexp(1.0, log2 + int(level)) < longest) ++level;
-    const auto mostCells = size_t(std::clamp(longest * longest / 8, double(1 << 16), double(1 << 20)));
+    const auto mostCells = size_t(std::clamp(longest * longest / 8, double(1 << 15), double(1 << 18)));
     for (; level <= mask.coarsestLevel(); ++level, log2 = std::max(log2 - 1, 0)) {
         Lattice lattice(mask, texels, edges, std::max(log2, log2OfEdges), level, mostCells);
         if (!lattice.run()) continue;

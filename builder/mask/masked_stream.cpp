@@ -34,7 +34,7 @@ public:
             else
                 isRead_ = true;
         }
-        while (next_ < held_.size() && hasRoom(chunk)) VCP_TRY(addParts(held_[next_++], chunk));
+        while (isRead_ && next_ < held_.size() && hasRoom(chunk)) VCP_TRY(addParts(held_[next_++], chunk));
         if (next_ == held_.size() && isRead_ && warnings_.empty() && !cutter_.warnings().empty()) endWarnings();
         return !isEmpty(chunk);
     }
