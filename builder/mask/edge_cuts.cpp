@@ -27,8 +27,6 @@ public:
         found_.startsKept = first >= 0;
         visit(0, steps_, first, last);
         if (found_.cuts.size() > most_) return std::nullopt;
-        // An edge without cuts asks for no steps.
-        if (found_.cuts.empty()) found_.log2Steps = 0;
         return std::move(found_);
     }
 
@@ -67,6 +65,13 @@ private:
     EdgeCuts found_;
 };
 
+/// Whether each step has at most one of the cuts.
+bool areApart(const std::vector<int32_t>& cuts, int log2Steps) {
+    const int shift = Weights::kLog2One - log2Steps;
+    return std::ranges::adjacent_find(cuts, [&](int32_t a, int32_t b) { return a >> shift == b >> shift; }) ==
+           cuts.end();
+}
+
 }  // namespace
 
 int log2StepsOf(double texels) {
@@ -102,6 +107,8 @@ std::optional<EdgeCuts> cutsBetween(const AlphaMask& mask, glm::dvec2 from, glm:
         std::reverse(found->cuts.begin(), found->cuts.end());
         for (int32_t& cut : found->cuts) cut = Weights::kOne - cut;
     }
+    // Few cuts ask for few steps.
+    while (found && found->log2Steps > 0 && areApart(found->cuts, found->log2Steps - 1)) --found->log2Steps;
     return found;
 }
 

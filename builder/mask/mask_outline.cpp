@@ -344,7 +344,7 @@ std::optional<MaskOutline> MaskOutline::find(const AlphaMask& mask, const Texels
     int log2 = log2StepsOf(longest);
     uint32_t level = 0;
     while (std::ldexp(1.0, log2 + int(level)) < longest) ++level;
-    const auto mostCells = size_t(std::clamp(longest * longest / 8, double(1 << 15), double(1 << 18)));
+    const auto mostCells = size_t(std::clamp(longest * longest / 8, double(1 << 15), double(1 << 19)));
     for (; level <= mask.coarsestLevel(); ++level, log2 = std::max(log2 - 1, 0)) {
         Lattice lattice(mask, texels, edges, std::max(log2, log2OfEdges), level, mostCells);
         if (!lattice.run()) continue;

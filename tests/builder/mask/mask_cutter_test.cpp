@@ -277,7 +277,7 @@ TEST_F(MaskCutterTest, SharedEdgesHaveTheSamePoints) {
         std::array<MaskCorner, 4> corner;
         for (MaskCorner& c : corner)
             c = {{unit(random), unit(random), unit(random)},
-                 {float(unit(random) / 5e5), float(unit(random) / 5e5)},
+                 {float(unit(random) / 1e6), float(unit(random) / 1e6)},
                  kWhite,
                  kUnknownNormal};
         // Triangles 0 1 2 and 2 1 3, the second beginning with any corner.
