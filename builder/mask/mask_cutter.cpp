@@ -14,14 +14,14 @@ namespace vcp {
 
 namespace {
 
-constexpr double kLeastParts = 128, kMostParts = 2048;
+constexpr double kLeastParts = 128, kMostParts = 4096;
 // Beyond this, a float no longer tells texels apart.
 constexpr double kFarthestTexel = double(1 << 26);
 
 size_t mostPartsOf(const std::array<glm::dvec2, 3>& t) {
     const glm::dvec2 a = t[1] - t[0], b = t[2] - t[0];
     const double area = std::abs(a.x * b.y - a.y * b.x) / 2;
-    return size_t(std::clamp(std::sqrt(area) / 2, kLeastParts, kMostParts));
+    return size_t(std::clamp(std::sqrt(area), kLeastParts, kMostParts));
 }
 
 /// Returns the parts; nothing where all is left.

@@ -330,7 +330,7 @@ TEST_F(MaskCutterTest, WorkAndPartsAreBounded) {
         const Uv uv{{{0, 0}, {repeats, 0}, {0.3f * repeats, repeats}}};
         const MaskParts* const parts = cut(grains, uv);
         if (parts == nullptr) continue;
-        EXPECT_LE(parts->triangles.size(), 2 * 2048u);
+        EXPECT_LE(parts->triangles.size(), 2 * 4096u);
         if (repeats < 0.5f) EXPECT_LE(parts->triangles.size(), 2 * 128u);
     }
     // A strip of many texels' length and hardly a width.
