@@ -331,11 +331,15 @@ TEST_F(MaskCutterTest, WorkAndPartsAreBounded) {
         const MaskParts* const parts = cut(grains, uv);
         if (parts == nullptr) continue;
         EXPECT_LE(parts->triangles.size(), 2 * 4096u);
-        if (repeats < 0.5f) EXPECT_LE(parts->triangles.size(), 2 * 128u);
+        if (repeats < 0.5f) {
+            EXPECT_LE(parts->triangles.size(), 2 * 128u);
+        }
     }
     // A strip of many texels' length and hardly a width.
     const MaskParts* const strip = cut(grains, {{{0, 0}, {20, 0.001f}, {20, 0}}});
-    if (strip != nullptr) EXPECT_LE(strip->triangles.size(), 2 * 128u);
+    if (strip != nullptr) {
+        EXPECT_LE(strip->triangles.size(), 2 * 128u);
+    }
 }
 
 TEST_F(MaskCutterTest, CoordinatesWithoutSense) {
