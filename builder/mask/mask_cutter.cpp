@@ -21,7 +21,7 @@ constexpr double kFarthestTexel = double(1 << 26);
 size_t mostPartsOf(const std::array<glm::dvec2, 3>& t) {
     const glm::dvec2 a = t[1] - t[0], b = t[2] - t[0];
     const double area = std::abs(a.x * b.y - a.y * b.x) / 2;
-    return size_t(std::clamp(std::sqrt(area), kLeastParts, kMostParts));
+    return size_t(std::clamp(std::sqrt(area) / 2, kLeastParts, kMostParts));
 }
 
 /// Returns the parts; nothing where all is left.

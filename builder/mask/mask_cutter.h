@@ -33,7 +33,7 @@ public:
 
     /// Returns what is left of a triangle of `materials[number]`, which may be beyond them; null: all of it. The parts
     /// are within half a texel of where bilinear alpha is at least the cutoff, unless they would be too many: more than
-    /// 128, and than texels lie along the root of the triangle's area; 4096 at most. Valid until the next call.
+    /// 128, and than half the texels along the root of its area; 4096 at most. Valid until the next call.
     const MaskParts* partsOf(std::span<const Material> materials, uint32_t number, const std::array<glm::vec2, 3>& uv);
 
     /// Triangles that were cut, or cut out.
