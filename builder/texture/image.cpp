@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "builder/texture/jpeg_rows.h"
+#include "builder/texture/png_chunks.h"
 #include "builder/texture/png_rows.h"
 
 namespace vcp {
@@ -61,6 +62,40 @@ Result<std::unique_ptr<ImageRows>> openImage(const ImageSource& source, const Im
     return rows;
 }
 
+namespace {
+
+/// Hands on the rows of another image, all of them opaque.
+class OpaqueRows final : public ImageRows {
+public:
+    explicit OpaqueRows(std::unique_ptr<ImageRows> image) : image_(std::move(image)) {}
+
+    [[nodiscard]] glm::uvec2 size() const override { return image_->size(); }
+    [[nodiscard]] uint64_t heldBytes() const override { return image_->heldBytes(); }
+    Result<void> read(std::span<Rgba8> texels) override {
+        VCP_TRY(image_->read(texels));
+        for (Rgba8& texel : texels) texel |= Rgba8{255} << 24;
+        return {};
+    }
+    [[nodiscard]] const JpegBlocks* blocks() const override { return image_->blocks(); }
+
+private:
+    std::unique_ptr<ImageRows> image_;
+};
+
+}  // namespace
+
+Result<std::unique_ptr<ImageRows>> openImage(const Material& material, const ImageLimits& limits) {
+    VCP_TRY_ASSIGN(auto image, openImage(material.image, limits));
+    if (material.ignoresAlpha) image = std::make_unique<OpaqueRows>(std::move(image));
+    return image;
+}
+
+bool mayBeTransparent(const ImageSource& source) {
+    if (source.bytes) return mayHaveAlpha(*randomBytesAt(*source.bytes));
+    const auto file = openRandomBytes(source.path);
+    return file && mayHaveAlpha(**file);
+}
+
 Result<Image> decodeImage(std::string_view file, const ImageLimits& limits) {
     VCP_TRY_ASSIGN(const auto rows, ImageRows::open(randomBytesAt(file), limits));
     return readWhole(*rows, limits);
@@ -70,6 +105,13 @@ Result<Image> loadImage(const ImageSource& source, const ImageLimits& limits) {
     VCP_TRY_ASSIGN(const auto rows, openImage(source, limits));
     auto image = readWhole(*rows, limits);
     if (!image) return namedImageError(source, image.error());
+    return image;
+}
+
+Result<Image> loadImage(const Material& material, const ImageLimits& limits) {
+    VCP_TRY_ASSIGN(const auto rows, openImage(material, limits));
+    auto image = readWhole(*rows, limits);
+    if (!image) return namedImageError(material.image, image.error());
     return image;
 }
 
