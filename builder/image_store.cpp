@@ -36,11 +36,10 @@ constexpr double kStoredOfJpeg = 1.5, kStoredOfPng = 0.9;
 // Time to read and code what becomes a byte of the file, on two cores.
 constexpr double kSecondsOfByte = 0.3e-6;
 
-/// Names an image by where it comes from, and whether its alpha counts: it is decoded once for all materials that have
-/// it.
-using ImageKey = std::tuple<std::filesystem::path, const std::string*, bool>;
+/// Names an image by where it comes from, and what its alpha does: it is decoded once for all materials that have it.
+using ImageKey = std::tuple<std::filesystem::path, const std::string*, bool, bool>;
 ImageKey keyOf(const Material& material) {
-    return {material.image.path, material.image.bytes.get(), material.ignoresAlpha};
+    return {material.image.path, material.image.bytes.get(), material.ignoresAlpha, material.isCutOut};
 }
 
 ImageWrap storedWrap(Wrap wrap) {
@@ -254,7 +253,7 @@ uint64_t expectedImageMemory(std::span<const Material> materials, uint64_t textu
     uint64_t rows = 0, textures = 0;
     for (const Material& material : materials) {
         if (!material.image.exists() || !known.insert(keyOf(material)).second) continue;
-        const auto image = openImage(material.image);
+        const auto image = openImage(material);
         if (!image) continue;
         rows = std::max(rows, memoryFor(**image));
         textures += Texture::bytesOf((*image)->size());

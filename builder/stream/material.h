@@ -47,6 +47,7 @@ struct Material {
     ImageSource image;          ///< image of the surface colour
     bool ignoresAlpha = false;  ///< all of the image is opaque, whatever its alpha
     MaskRule mask;
+    bool isCutOut = false;  ///< what is transparent was cut out of the mesh (MaskRule)
     Wrap wrapU = Wrap::Repeat;
     Wrap wrapV = Wrap::Repeat;
 };

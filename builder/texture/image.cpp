@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "builder/texture/filled_rows.h"
 #include "builder/texture/jpeg_rows.h"
 #include "builder/texture/png_chunks.h"
 #include "builder/texture/png_rows.h"
@@ -86,7 +87,9 @@ private:
 
 Result<std::unique_ptr<ImageRows>> openImage(const Material& material, const ImageLimits& limits) {
     VCP_TRY_ASSIGN(auto image, openImage(material.image, limits));
-    if (material.ignoresAlpha) image = std::make_unique<OpaqueRows>(std::move(image));
+    if (material.ignoresAlpha) return std::unique_ptr<ImageRows>(std::make_unique<OpaqueRows>(std::move(image)));
+    if (material.isCutOut && mayBeTransparent(material.image))
+        image = filledRows(std::move(image), [source = material.image, limits] { return openImage(source, limits); });
     return image;
 }
 
