@@ -40,6 +40,8 @@ public:
     Measurer(SoupMeasures& measures, BuildSample& sample, uint64_t maxVertices, uint64_t maskBytes)
         : measures_(measures), sample_(sample), maxVertices_(maxVertices), cutter_(maskBytes), cuts_(maskBytes > 0) {}
 
+    void setMaskDetail(double length) { cutter_.setDetail(length); }
+
     void add(const MeshChunk& chunk, std::span<const Material> materials) {
         const size_t room = size_t(std::min<uint64_t>(chunk.positions.size(), maxVertices_ - positions_.size()));
         positions_.insert(positions_.end(), chunk.positions.begin(), chunk.positions.begin() + ptrdiff_t(room));
@@ -199,6 +201,14 @@ Result<BuildEstimate> estimateBuild(const BuildOptions& options) {
         VCP_TRY_ASSIGN(auto stream, openMesh(path, meshOptionsOf(options)));
         Measurer measurer(m, sample, plan.vertexBytes / (sizeof(glm::dvec3) + sizeof(Rgba8) + sizeof(uint32_t)),
                           options.masks ? plan.vertexBytes / 4 : 0);
+        if (options.masks && std::ranges::any_of(stream->materials(), mayCut)) {
+            const auto goesOn = [&] {
+                return !options.progress ||
+                       options.progress({.stage = "reading", .fraction = 0, .triangles = m.triangles});
+            };
+            VCP_TRY_ASSIGN(const double detail, maskDetailOf(path, options, goesOn));
+            measurer.setMaskDetail(detail);
+        }
         for (;;) {
             VCP_TRY_ASSIGN(auto more, stream->next(chunk));
             if (!more) break;

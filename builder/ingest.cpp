@@ -184,6 +184,12 @@ Result<SoupMeasures> readInputs(const BuildOptions& options, TempSpace& space, u
             return writer.add(plain);
         };
         const bool hasMasks = options.masks && std::ranges::any_of(stream->materials(), mayCut);
+        if (hasMasks) {
+            const double fraction = totalBytes > 0 ? std::min(double(doneBytes) / double(totalBytes), 1.0) : 0;
+            const auto goesOn = [&] { return progress(fraction, writer.triangles()); };
+            VCP_TRY_ASSIGN(const double detail, maskDetailOf(path, options, goesOn));
+            cutter.setDetail(detail);
+        }
         VertexJoin join(space, vertexBytes, [&](const WorldTriangle<double>& t) {
             if (!hasMasks || t.material <= materialBase) return take(t);
             return cutByMask(cutter, stream->materials(), t.material - materialBase - 1, t, take);
@@ -204,8 +210,12 @@ Result<SoupMeasures> readInputs(const BuildOptions& options, TempSpace& space, u
             if (!progress(fraction, writer.triangles())) return Error::cancelled();
         }
         doneBytes += stream->bytesRead();
-        if (isPainted)
-            soup.materials.insert(soup.materials.end(), stream->materials().begin(), stream->materials().end());
+        if (isPainted) {
+            for (const Material& material : stream->materials()) {
+                soup.materials.push_back(material);
+                soup.materials.back().isCutOut = hasMasks && material.mask.image.exists();
+            }
+        }
         warnings.insert(warnings.end(), stream->warnings().begin(), stream->warnings().end());
         for (const SideFile& each : stream->sideFiles())
             if (named.insert(each.path).second) sideFiles.push_back(each);
@@ -237,6 +247,23 @@ Result<SoupMeasures> readInputs(const BuildOptions& options, TempSpace& space, u
     if (options.colour == ColourChoice::Texture && !m.hasMaterials)
         return badInput(options, "has no materials with a colour or a texture; choose another colour to keep");
     return m;
+}
+
+Result<double> maskDetailOf(const std::filesystem::path& path, const BuildOptions& options,
+                            const std::function<bool()>& progress) {
+    std::error_code ignored;
+    if (!std::filesystem::is_regular_file(path, ignored)) return 0.0;
+    MeshOpenOptions open = meshOptionsOf(options);
+    open.materials = false;
+    VCP_TRY_ASSIGN(const auto stream, openMesh(path, open));
+    MaskDetail detail;
+    MeshChunk chunk;
+    for (;;) {
+        VCP_TRY_ASSIGN(const bool more, stream->next(chunk));
+        if (!more) return detail.length();
+        detail.add(chunk.positions);
+        if (!progress()) return Error::cancelled();
+    }
 }
 
 MeshOpenOptions meshOptionsOf(const BuildOptions& options) {

@@ -12,6 +12,7 @@
 #include "builder/build.h"
 #include "builder/lattice/soup.h"
 #include "builder/mask/mask_cutter.h"
+#include "builder/mask/mask_detail.h"
 #include "builder/spill/record_bins.h"
 #include "builder/stream/material.h"
 #include "builder/stream/mesh_stream.h"
@@ -64,18 +65,25 @@ struct Soup {
 };
 
 /// Reads all inputs into `soup` (flushed), cut by the masks of their materials. `vertexBytes`: memory for the vertices
-/// of one input; masks take up to a quarter as much beside them. `progress` is given the
-/// fraction read; false cancels. Triangles without area are counted and left out. `warnings` lists what the readers
+/// of one input; masks take up to a quarter as much beside them. An input with masks is read twice. `progress` is given
+/// the fraction read; false cancels. Triangles without area are counted and left out. `warnings` lists what the readers
 /// left out, `sideFiles` the files that the inputs name, each once. Uses the calling arena's threads.
 Result<SoupMeasures> readInputs(const BuildOptions& options, TempSpace& space, uint64_t vertexBytes, Soup& soup,
                                 const std::function<bool(double fraction, uint64_t triangles)>& progress,
                                 std::vector<std::string>& warnings, std::vector<SideFile>& sideFiles);
 
+/// Returns what MaskCutter::setDetail() is to be given for an input with masks, whose vertices are read for that; 0
+/// where it can be read only once. `progress` returning false cancels. Errors: as those of MeshStream.
+Result<double> maskDetailOf(const std::filesystem::path& path, const BuildOptions& options,
+                            const std::function<bool()>& progress);
+
 /// Gives what a mask leaves of a triangle of `materials[number]` to `take`, which returns a Result<void>.
 template <class Take>
 Result<void> cutByMask(MaskCutter& cutter, std::span<const Material> materials, uint32_t number,
                        const WorldTriangle<double>& triangle, Take&& take) {
-    const MaskParts* const parts = cutter.partsOf(materials, number, {triangle.uv[0], triangle.uv[1], triangle.uv[2]});
+    const MaskParts* const parts =
+        cutter.partsOf(materials, number, {triangle.uv[0], triangle.uv[1], triangle.uv[2]},
+                       triangleArea(triangle.corner[0], triangle.corner[1], triangle.corner[2]));
     if (parts == nullptr) return take(triangle);
     std::array<MaskCorner, 3> corners;
     for (size_t i = 0; i < 3; ++i)

@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <span>
 #include <utility>
 
 #include <fmt/format.h>
+#include <glm/common.hpp>
 
 #include "builder/texture/image.h"
 #include "builder/texture/texel_wrap.h"
@@ -67,7 +69,7 @@ ByteImage halved(const ByteImage& fine) {
     return coarse;
 }
 
-bool mayBeHalved(const ByteImage& image) { return std::min(image.width, image.height) >= 2 * kLeastEdge; }
+bool mayBeHalved(glm::uvec2 size) { return std::min(size.x, size.y) >= 2 * kLeastEdge; }
 
 uint8_t bitOf(uint8_t alpha, double cutoff) { return alpha < cutoff ? AlphaMask::kCut : AlphaMask::kKept; }
 
@@ -91,7 +93,7 @@ AlphaMask::AlphaMask(ByteImage alpha, double cutoff, Wrap wrapU, Wrap wrapV)
     while (contents_.back().values.size() > 1)
         contents_.push_back(blocksOf(contents_.back(), 2, [](uint8_t content) { return content; }));
     levels_.push_back(std::move(alpha));
-    while (mayBeHalved(levels_.back())) levels_.push_back(halved(levels_.back()));
+    while (mayBeHalved({levels_.back().width, levels_.back().height})) levels_.push_back(halved(levels_.back()));
 }
 
 uint64_t AlphaMask::bytes() const {
@@ -138,43 +140,95 @@ AlphaMask::Content AlphaMask::contentOf(glm::dvec2 low, glm::dvec2 high) const {
     return contentIn(contents_[level], kBlockEdge << level, [](uint8_t content) { return content; });
 }
 
-namespace {
-
-uint8_t greyOf(Rgba8 c) {
-    return uint8_t((299 * (c & 255u) + 587 * (c >> 8 & 255u) + 114 * (c >> 16 & 255u) + 500) / 1000);
-}
-
-/// Returns an image's alpha, or its grey where the rule wants that.
-std::vector<uint8_t> alphaOf(const Image& image, const MaskRule& rule) {
-    const auto isOpaque = [](Rgba8 texel) { return texel >> 24 == 255; };
-    const bool isGrey = rule.mayBeGrey && std::all_of(image.texels.begin(), image.texels.end(), isOpaque);
-    std::vector<uint8_t> alpha(image.texels.size());
-    std::transform(image.texels.begin(), image.texels.end(), alpha.begin(),
-                   [&](Rgba8 texel) { return isGrey ? greyOf(texel) : uint8_t(texel >> 24); });
-    return alpha;
-}
-
-}  // namespace
-
 bool mayCut(const Material& material) {
     const MaskRule& rule = material.mask;
     if (rule.cutoff > 1) return true;
     return rule.image.exists() && (rule.mayBeGrey || mayBeTransparent(rule.image));
 }
 
-Result<AlphaMask> loadMask(const Material& material, uint64_t mostBytes, std::string& warning) {
+namespace {
+
+// Larger masks are read at a coarser level; not for lack of memory, so that what is cut does not depend on it.
+constexpr uint64_t kMostTexels = uint64_t{4096} * 4096;
+
+uint8_t greyOf(Rgba8 c) {
+    return uint8_t((299 * (c & 255u) + 587 * (c >> 8 & 255u) + 114 * (c >> 16 & 255u) + 500) / 1000);
+}
+
+/// A channel of an image, made while its rows are read: each texel is a mean of those that it covers.
+class ChannelRows {
+public:
+    ChannelRows(glm::uvec2 fine, glm::uvec2 coarse) : fine_(fine), coarse_{coarse.x, coarse.y, {}} {
+        coarse_.values.reserve(size_t{coarse.x} * coarse.y);
+    }
+
+    /// Takes the next row.
+    void add(std::span<const uint8_t> row) {
+        most_ = std::max(most_, *std::max_element(row.begin(), row.end()));
+        rows_.insert(rows_.end(), row.begin(), row.end());
+        const auto made = uint32_t(coarse_.values.size() / coarse_.width);
+        const auto [first, end] = covered(made, coarse_.height, fine_.y);
+        if (++count_ < end) return;
+        addMeans(end - first);
+        // The next may cover this one's last row, too.
+        if (made + 1 < coarse_.height)
+            rows_.erase(rows_.begin(),
+                        rows_.end() - ptrdiff_t(end - covered(made + 1, coarse_.height, fine_.y).first) * fine_.x);
+    }
+    [[nodiscard]] uint8_t most() const { return most_; }
+    ByteImage take() { return std::move(coarse_); }
+
+private:
+    void addMeans(uint32_t rows) {
+        for (uint32_t x = 0; x < coarse_.width; ++x) {
+            const auto columns = covered(x, coarse_.width, fine_.x);
+            uint64_t sum = 0;
+            for (uint32_t j = 0; j < rows; ++j)
+                for (uint32_t i = columns.first; i < columns.second; ++i) sum += rows_[size_t{j} * fine_.x + i];
+            const uint64_t count = uint64_t{columns.second - columns.first} * rows;
+            coarse_.values.push_back(uint8_t((sum + count / 2) / count));
+        }
+    }
+
+    glm::uvec2 fine_;
+    ByteImage coarse_;
+    std::vector<uint8_t> rows_;  // the last that were read, and that are not done with
+    uint32_t count_ = 0;         // of the rows read
+    uint8_t most_ = 0;
+};
+
+}  // namespace
+
+Result<AlphaMask> loadMask(const Material& material, uint64_t mostBytes) {
     const MaskRule& rule = material.mask;
-    VCP_TRY_ASSIGN(const auto image, loadImage(rule.image));
-    ByteImage alpha{image.width, image.height, alphaOf(image, rule)};
+    VCP_TRY_ASSIGN(const auto image, openImage(rule.image));
+    if (image->heldBytes() > mostBytes)
+        return namedImageError(
+            rule.image,
+            {.code = ErrorCode::Limit,
+             .message = fmt::format("a mask that takes {} MiB while it is read, and {} MiB are there for it; let the "
+                                    "memory cap be larger",
+                                    (image->heldBytes() >> 20) + 1, mostBytes >> 20)});
+    const glm::uvec2 size = image->size();
+    glm::uvec2 kept = size;
+    while (uint64_t{kept.x} * kept.y > kMostTexels && mayBeHalved(kept)) kept = glm::max(kept / 2u, glm::uvec2(1));
+    ChannelRows alpha(size, kept), grey(size, rule.mayBeGrey ? kept : glm::uvec2(1));
+    std::vector<Rgba8> texels(size.x);
+    std::vector<uint8_t> row(size.x);
+    bool isOpaque = true;
+    for (uint32_t y = 0; y < size.y; ++y) {
+        if (const auto read = image->read(texels); !read) return namedImageError(rule.image, read.error());
+        std::transform(texels.begin(), texels.end(), row.begin(), [](Rgba8 texel) { return uint8_t(texel >> 24); });
+        isOpaque = isOpaque && std::all_of(row.begin(), row.end(), [](uint8_t a) { return a == 255; });
+        alpha.add(row);
+        if (!rule.mayBeGrey) continue;
+        std::transform(texels.begin(), texels.end(), row.begin(), greyOf);
+        grey.add(row);
+    }
+    ChannelRows& counts = rule.mayBeGrey && isOpaque ? grey : alpha;
     double cutoff = 255 * rule.cutoff;
-    if (rule.sparesGlass && *std::max_element(alpha.values.begin(), alpha.values.end()) < cutoff) cutoff = 0;
-    // A mask has coarser levels and blocks beside its texels.
-    while (alpha.values.size() + alpha.values.size() / 2 > mostBytes && mayBeHalved(alpha)) alpha = halved(alpha);
-    if (alpha.width < image.width)
-        warning =
-            fmt::format("{}: the mask of material '{}' has {} by {} texels; for lack of memory {} by {} are read",
-                        rule.image.path.string(), material.name, image.width, image.height, alpha.width, alpha.height);
-    return AlphaMask(std::move(alpha), cutoff, material.wrapU, material.wrapV);
+    if (rule.sparesGlass && counts.most() < cutoff) cutoff = 0;
+    return AlphaMask(counts.take(), cutoff, material.wrapU, material.wrapV);
 }
 
 }  // namespace vcp

@@ -5,7 +5,6 @@
 #pragma once
 
 #include <cstdint>
-#include <string>
 #include <vector>
 
 #include <glm/vec2.hpp>
@@ -48,11 +47,12 @@ private:
     Wrap wrapU_, wrapV_;
 };
 
-/// Whether a material's mask may cut anything, by the start of its image's file: most images have no alpha.
+/// Whether a material's mask may cut anything, by the chunks of its image's file: most images have no alpha.
 bool mayCut(const Material& material);
 
-/// Reads the mask of a material whose rule has an image. A mask that takes more than `mostBytes` is read at a coarser
-/// level, and `warning` says so. Errors: as loadImage().
-Result<AlphaMask> loadMask(const Material& material, uint64_t mostBytes, std::string& warning);
+/// Reads the mask of a material whose rule has an image, row by row; one of more than 4096 x 4096 texels at a coarser
+/// level. `mostBytes`: that the image may hold meanwhile (ImageRows). Errors: as those of ImageRows and openImage(),
+/// and Limit; with the file's name.
+Result<AlphaMask> loadMask(const Material& material, uint64_t mostBytes);
 
 }  // namespace vcp

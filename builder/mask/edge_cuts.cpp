@@ -95,7 +95,7 @@ std::optional<EdgeCuts> cutsBetween(const AlphaMask& mask, glm::dvec2 from, glm:
     const bool isTurned = std::pair(to.x, to.y) < std::pair(from.x, from.y);
     if (isTurned) std::swap(from, to);
     const double texels = glm::length(to - from);
-    const auto most = size_t(std::clamp(texels / 8, 16.0, 128.0));
+    const auto most = size_t(std::clamp(texels / 8, 16.0, 1024.0));
     int log2Steps = log2StepsOf(texels);
     uint32_t level = 0;
     while (std::ldexp(1.0, log2Steps + int(level)) < texels && level <= mask.coarsestLevel()) ++level;

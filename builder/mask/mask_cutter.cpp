@@ -7,38 +7,62 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
+#include "builder/mask/delaunay.h"
 #include "builder/mask/mask_outline.h"
+#include "builder/mask/outline_simplifier.h"
 #include "builder/mask/triangulation.h"
 
 namespace vcp {
 
 namespace {
 
-constexpr double kLeastParts = 128, kMostParts = 4096;
+// A part has so many texels at least, in the mean, and so many of the squares that may go; but a triangle that has few
+// of both makes the least parts.
+constexpr double kTexelsOfPart = 128, kSparedOfPart = 2, kLeastParts = 256, kMostParts = 1 << 16;
+// The outline is off by a quarter of a texel before it is simplified.
+constexpr double kTolerance = 1.25;
+// What surrounds less than this is a fault of the mask, in square texels.
+constexpr double kLeastArea = 2;
+// A loop that is small in the world keeps its shape: some 14 corners of a disc.
+constexpr double kLeastPart = 1.0 / 64;
 // Beyond this, a float no longer tells texels apart.
 constexpr double kFarthestTexel = double(1 << 26);
 
-size_t mostPartsOf(const std::array<glm::dvec2, 3>& t) {
+double areaOf(const std::array<glm::dvec2, 3>& t) {
     const glm::dvec2 a = t[1] - t[0], b = t[2] - t[0];
-    const double area = std::abs(a.x * b.y - a.y * b.x) / 2;
-    return size_t(std::clamp(std::sqrt(area) / 2, kLeastParts, kMostParts));
+    return std::abs(a.x * b.y - a.y * b.x) / 2;
 }
 
-/// Returns the parts; nothing where all is left.
-std::optional<MaskParts> cutTriangle(const AlphaMask& mask, const std::array<glm::dvec2, 3>& texels) {
-    auto outline = MaskOutline::find(mask, texels);
-    if (!outline || outline->isWhole()) return std::nullopt;
-    const size_t most = mostPartsOf(texels);
-    const double longest = glm::distance(texels[0], texels[1]) + glm::distance(texels[0], texels[2]);
-    // Lines that cross make more than is known before.
-    for (double tolerance = outline->leastTolerance();; tolerance *= 2) {
-        outline->simplify(tolerance);
-        const bool isCoarsest = tolerance > longest;
-        if (outline->triangles() > most && !isCoarsest) continue;
-        if (outline->isWhole()) return std::nullopt;
-        MaskParts parts = triangulate(outline->loops());
-        if (parts.triangles.size() <= 2 * most || isCoarsest) return parts;
+/// Returns the binary logarithm of how many square texels may be left out since they are less than `detail`: whole, so
+/// that triangles of one shape share what is cut.
+int log2OfSpared(double squareTexels, double worldArea, double detail) {
+    const double spared = detail * detail * squareTexels / worldArea;
+    if (!(spared > 1)) return 0;
+    constexpr double kRootOfTwo = 1.4142135623730951;
+    constexpr int kMost = 60;
+    return spared < std::ldexp(1.0, kMost) ? std::ilogb(spared * kRootOfTwo) : kMost;
+}
+
+/// Returns what is left of a triangle; nothing where all is. `spared`: square texels that nobody sees.
+std::optional<MaskParts> cutTriangle(const AlphaMask& mask, const std::array<glm::dvec2, 3>& texels, double spared) {
+    const double ofPart = std::max(kTexelsOfPart, kSparedOfPart * spared);
+    const auto most = size_t(std::clamp(areaOf(texels) / ofPart, kLeastParts, kMostParts));
+    for (uint32_t level = 0; level <= mask.coarsestLevel(); ++level) {
+        const auto outline = findOutline(mask, texels, level);
+        if (!outline || outline->isWhole(outline->loops)) return std::nullopt;
+        level = outline->level;
+        OutlineSimplifier simplifier(outline->loops, texels);
+        simplifier.keepLoops(std::ldexp(kLeastArea, 2 * int(level)));
+        simplifier.keepWithin(std::ldexp(kTolerance, int(level)));
+        if (spared > 1) simplifier.keepAreas(spared, kLeastPart);
+        if (simplifier.triangles() > most) continue;
+        const std::vector<MaskLoop> loops = simplifier.loops();
+        if (outline->isWhole(loops)) return std::nullopt;
+        MaskParts parts = triangulate(loops);
+        makeDelaunay(texels, parts);
+        return parts;
     }
+    return std::nullopt;
 }
 
 }  // namespace
@@ -51,10 +75,8 @@ const AlphaMask* MaskCutter::maskOf(std::span<const Material> materials, uint32_
         return &loaded_.front().mask;
     }
     if (!mayCut(materials[number])) return nullptr;
-    std::string warning;
-    auto mask = loadMask(materials[number], memoryBytes_, warning);
-    if (!mask) warning = mask.error().line() + "; material '" + materials[number].name + "' is not cut";
-    if (!warning.empty()) warnings_.push_back(std::move(warning));
+    auto mask = loadMask(materials[number], memoryBytes_);
+    if (!mask) warnings_.push_back(mask.error().line() + "; material '" + materials[number].name + "' is not cut");
     if (!mask || mask->content() == AlphaMask::kKept) return nullptr;
     loaded_.push_front({number, *std::move(mask)});
     found->second = loaded_.begin();
@@ -70,7 +92,7 @@ const AlphaMask* MaskCutter::maskOf(std::span<const Material> materials, uint32_
 const MaskParts* MaskCutter::cut(const AlphaMask& mask, const Place& place, const std::array<glm::dvec2, 3>& texels) {
     const auto [found, isNew] = known_.try_emplace(place);
     if (isNew) {
-        found->second = cutTriangle(mask, texels);
+        found->second = cutTriangle(mask, texels, std::ldexp(1.0, place.log2Spared));
         constexpr uint64_t kPlaceBytes = 128;
         knownBytes_ += kPlaceBytes;
         if (found->second)
@@ -89,7 +111,7 @@ const MaskParts* MaskCutter::cut(const AlphaMask& mask, const Place& place, cons
 }
 
 const MaskParts* MaskCutter::partsOf(std::span<const Material> materials, uint32_t number,
-                                     const std::array<glm::vec2, 3>& uv) {
+                                     const std::array<glm::vec2, 3>& uv, double area) {
     static const MaskParts kNothing;
     if (number >= materials.size() || !materials[number].mask.exists()) return nullptr;
     const MaskRule& rule = materials[number].mask;
@@ -109,7 +131,11 @@ const MaskParts* MaskCutter::partsOf(std::span<const Material> materials, uint32
         const auto content = mask->contentOf(low, high);
         if (content == AlphaMask::kKept) return nullptr;
         if (content == AlphaMask::kBoth)
-            parts = cut(*mask, {number, {uv[0].x, uv[0].y, uv[1].x, uv[1].y, uv[2].x, uv[2].y}}, texels);
+            parts = cut(*mask,
+                        {number,
+                         log2OfSpared(areaOf(texels), area, detail_),
+                         {uv[0].x, uv[0].y, uv[1].x, uv[1].y, uv[2].x, uv[2].y}},
+                        texels);
     }
     cutTriangles_ += parts != nullptr;
     return parts;

@@ -31,10 +31,17 @@ public:
     /// `memoryBytes`: for masks and for parts that may be asked for again.
     explicit MaskCutter(uint64_t memoryBytes) : memoryBytes_(memoryBytes) {}
 
+    /// Lets the outline's corners that span less than a square of this length go, unless that is much of what the
+    /// outline surrounds. 0: none. Before the first triangle.
+    void setDetail(double length) { detail_ = length; }
+
     /// Returns what is left of a triangle of `materials[number]`, which may be beyond them; null: all of it. The parts
-    /// are within half a texel of where bilinear alpha is at least the cutoff, unless they would be too many: more than
-    /// 128, and than half the texels along the root of its area; 4096 at most. Valid until the next call.
-    const MaskParts* partsOf(std::span<const Material> materials, uint32_t number, const std::array<glm::vec2, 3>& uv);
+    /// are within 1.5 texels of where bilinear alpha is at least the cutoff, but for what may go, and what surrounds
+    /// less than 2 square texels. They are at most one for each 128 texels and for each two squares of the detail, but
+    /// 256 to 65536: where that is too few, the mask is looked at more coarsely, and where the coarsest is too much,
+    /// the triangle stays whole. `area`: of the triangle, in the unit of the detail. Valid until the next call.
+    const MaskParts* partsOf(std::span<const Material> materials, uint32_t number, const std::array<glm::vec2, 3>& uv,
+                             double area);
 
     /// Triangles that were cut, or cut out.
     [[nodiscard]] uint64_t cutTriangles() const { return cutTriangles_; }
@@ -48,6 +55,7 @@ private:
     };
     struct Place {
         uint32_t material;
+        int log2Spared;
         std::array<float, 6> uv;
         auto operator<=>(const Place&) const = default;
     };
@@ -56,6 +64,7 @@ private:
     const MaskParts* cut(const AlphaMask& mask, const Place& place, const std::array<glm::dvec2, 3>& texels);
 
     uint64_t memoryBytes_;
+    double detail_ = 0;
     std::list<Loaded> loaded_;                                                   // the one used last comes first
     std::map<uint32_t, std::optional<std::list<Loaded>::iterator>> byMaterial_;  // nothing: it cuts nothing
     uint64_t loadedBytes_ = 0;

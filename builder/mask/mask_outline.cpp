@@ -16,11 +16,6 @@ namespace {
 using Edges = std::array<EdgeCuts, 3>;  // from corner 0 to 1, 1 to 2, 2 to 0
 using Texels = std::array<glm::dvec2, 3>;
 
-glm::dvec2 placeOf(const Texels& texels, const Weights& w) {
-    const auto part = [&](int corner) { return std::ldexp(double(w.of[corner]), -Weights::kLog2One); };
-    return texels[0] + part(1) * (texels[1] - texels[0]) + part(2) * (texels[2] - texels[0]);
-}
-
 /// A point of the lattice that cuts a triangle's edges into 2^log2 steps: `i` steps towards corner 1, `j` towards 2.
 struct Place {
     uint32_t i, j;
@@ -253,84 +248,13 @@ private:
     std::vector<Cut> cuts_;
 };
 
-double distanceToSegment(glm::dvec2 p, glm::dvec2 a, glm::dvec2 b) {
-    const glm::dvec2 ab = b - a;
-    const double square = glm::dot(ab, ab);
-    const double part = square > 0 ? std::clamp(glm::dot(p - a, ab) / square, 0.0, 1.0) : 0.0;
-    return glm::length(p - a - part * ab);
-}
-
-/// Marks which points between two that stay must stay, too.
-void markNeeded(const std::vector<glm::dvec2>& at, size_t first, size_t last, double tolerance,
-                std::vector<uint8_t>& stays) {
-    std::vector<std::pair<size_t, size_t>> open{{first, last}};
-    while (!open.empty()) {
-        const auto [a, b] = open.back();
-        open.pop_back();
-        double farthest = tolerance;
-        size_t which = a;
-        for (size_t k = a + 1; k < b; ++k)
-            if (const double d = distanceToSegment(at[k], at[a], at[b]); d > farthest) {
-                farthest = d;
-                which = k;
-            }
-        if (which == a) continue;
-        stays[which] = 1;
-        open.emplace_back(a, which);
-        open.emplace_back(which, b);
-    }
-}
-
-/// Returns which point between two is farthest from the line that they end; the last where there is none.
-size_t farthestFrom(const std::vector<glm::dvec2>& at, size_t first, size_t last) {
-    size_t which = std::min(first + 1, last);
-    for (size_t k = first + 1; k < last; ++k)
-        if (distanceToSegment(at[k], at[first], at[last]) > distanceToSegment(at[which], at[first], at[last]))
-            which = k;
-    return which;
-}
-
-/// Whether a chain comes back to the edge that it left. It must not fall into the edge, where the triangle beyond may
-/// keep its own, and so has the chain's ends as corners.
-bool areOnOneEdge(const MaskLoop::Point& a, const MaskLoop::Point& b) {
-    for (int k = 0; k < 3; ++k)
-        if (a.isFixed && b.isFixed && a.weights.of[k] == 0 && b.weights.of[k] == 0) return true;
-    return false;
-}
-
-/// Simplifying takes time as the square of the points between two that stay: at least each so many-th does.
-constexpr size_t kLongestRun = 512;
-
-std::vector<MaskLoop::Point> simplified(std::vector<MaskLoop::Point> points, const Texels& texels, double tolerance) {
-    const auto fixed = std::find_if(points.begin(), points.end(), [](const auto& p) { return p.isFixed; });
-    if (fixed != points.end()) std::rotate(points.begin(), fixed, points.end());
-    // The first point ends the loop, too.
-    const size_t count = points.size();
-    std::vector<glm::dvec2> at;
-    for (size_t k = 0; k <= count; ++k) at.push_back(placeOf(texels, points[k % count].weights));
-    std::vector<uint8_t> stays(count + 1, 0);
-    for (size_t k = 0; k <= count; ++k) stays[k] = points[k % count].isFixed || k % kLongestRun == 0 || k == count;
-    if (fixed == points.end()) {
-        size_t farthest = 0;
-        for (size_t k = 0; k < count; ++k)
-            if (glm::distance(at[k], at[0]) > glm::distance(at[farthest], at[0])) farthest = k;
-        stays[farthest] = 1;
-    }
-    for (size_t first = 0, k = 1; k <= count; ++k)
-        if (stays[k]) {
-            if (areOnOneEdge(points[first], points[k % count])) stays[farthestFrom(at, first, k)] = 1;
-            markNeeded(at, first, k, tolerance, stays);
-            first = k;
-        }
-    std::vector<MaskLoop::Point> left;
-    for (size_t k = 0; k < count; ++k)
-        if (stays[k]) left.push_back(points[k]);
-    return left;
-}
-
 }  // namespace
 
-std::optional<MaskOutline> MaskOutline::find(const AlphaMask& mask, const Texels& texels) {
+bool MaskOutline::isWhole(const std::vector<MaskLoop>& left) const {
+    return keepsEdges && left.size() == 1 && left[0].points.size() == 3 && left[0].points[0].isFixed;
+}
+
+std::optional<MaskOutline> findOutline(const AlphaMask& mask, const Texels& texels, uint32_t leastLevel) {
     Edges edges;
     int log2OfEdges = 0;
     double longest = 0;
@@ -341,34 +265,20 @@ std::optional<MaskOutline> MaskOutline::find(const AlphaMask& mask, const Texels
         log2OfEdges = std::max(log2OfEdges, edges[e].log2Steps);
         longest = std::max(longest, glm::distance(texels[e], texels[(e + 1) % 3]));
     }
-    int log2 = log2StepsOf(longest);
+    constexpr double kLongestStep = 1.5;  // texels
+    int log2 = log2StepsOf(longest / kLongestStep);
     uint32_t level = 0;
-    while (std::ldexp(1.0, log2 + int(level)) < longest) ++level;
+    while (kLongestStep * std::ldexp(1.0, log2 + int(level)) < longest) ++level;
+    for (; level < leastLevel; ++level) log2 = std::max(log2 - 1, 0);
     const auto mostCells = size_t(std::clamp(longest * longest / 8, double(1 << 15), double(1 << 19)));
     for (; level <= mask.coarsestLevel(); ++level, log2 = std::max(log2 - 1, 0)) {
         Lattice lattice(mask, texels, edges, std::max(log2, log2OfEdges), level, mostCells);
         if (!lattice.run()) continue;
-        MaskOutline outline;
-        outline.texels_ = texels;
-        outline.loops_ = LoopJoin(lattice, edges, lattice.steps()).run();
-        constexpr double kLeastTolerance = 0.35;
-        outline.leastTolerance_ = std::ldexp(kLeastTolerance, int(level));
-        outline.allKept_ =
+        const bool keepsEdges =
             edges[0].startsKept && std::ranges::all_of(edges, [](const auto& e) { return e.cuts.empty(); });
-        return outline;
+        return MaskOutline{LoopJoin(lattice, edges, lattice.steps()).run(), level, keepsEdges};
     }
     return std::nullopt;
-}
-
-void MaskOutline::simplify(double tolerance) {
-    for (MaskLoop& loop : loops_) loop.points = simplified(std::move(loop.points), texels_, tolerance);
-    std::erase_if(loops_, [](const MaskLoop& loop) { return loop.points.size() < 3; });
-}
-
-size_t MaskOutline::triangles() const {
-    size_t points = 0;
-    for (const MaskLoop& loop : loops_) points += loop.points.size();
-    return points + 2 * std::max<size_t>(loops_.size(), 1) - 2;
 }
 
 }  // namespace vcp

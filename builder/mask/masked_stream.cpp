@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "builder/mask/mask_detail.h"
 #include "builder/stream/chunk_room.h"
 
 namespace vcp {
@@ -32,7 +33,7 @@ public:
             if (more)
                 hold(chunk);
             else
-                isRead_ = true;
+                endReading();
         }
         while (isRead_ && next_ < held_.size() && hasRoom(chunk)) VCP_TRY(addParts(held_[next_++], chunk));
         if (next_ == held_.size() && isRead_ && warnings_.empty() && !cutter_.warnings().empty()) endWarnings();
@@ -46,6 +47,13 @@ private:
         uint32_t material;
         std::array<uint32_t, 3> normals;  // kUnknownNormal: the vertex's
     };
+
+    void endReading() {
+        isRead_ = true;
+        MaskDetail detail;
+        detail.add(positions_);
+        cutter_.setDetail(detail.length());
+    }
 
     /// Keeps the vertices of a chunk, and takes those triangles out of it that have a mask.
     void hold(MeshChunk& chunk) {
@@ -90,7 +98,9 @@ private:
                           : v < normals_.size() ? normals_[v]
                                                 : kUnknownNormal};
         }
-        const MaskParts* const parts = cutter_.partsOf(materials(), held.material, held.uv);
+        const MaskParts* const parts =
+            cutter_.partsOf(materials(), held.material, held.uv,
+                            triangleArea(corners[0].position, corners[1].position, corners[2].position));
         if (parts == nullptr) {
             addTriangle(held.vertices, corners, held.material, chunk);
             return {};

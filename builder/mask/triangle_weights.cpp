@@ -54,6 +54,11 @@ uint32_t blendNormals(const std::array<MaskCorner, 3>& corners, const Weights& w
 
 }  // namespace
 
+glm::dvec2 placeOf(const std::array<glm::dvec2, 3>& texels, const Weights& w) {
+    const auto part = [&](int corner) { return std::ldexp(double(w.of[corner]), -Weights::kLog2One); };
+    return texels[0] + part(1) * (texels[1] - texels[0]) + part(2) * (texels[2] - texels[0]);
+}
+
 MaskCorner blend(const std::array<MaskCorner, 3>& corners, const Weights& weights) {
     const Order o = orderOf(weights);
     const MaskCorner &a = corners[size_t(o.first)], &b = corners[size_t(o.second)], &c = corners[size_t(o.third)];

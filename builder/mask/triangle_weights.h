@@ -29,6 +29,15 @@ struct Weights {
     bool operator==(const Weights&) const = default;
 };
 
+/// Returns twice the area of a triangle of points, positive where they go round to the left; exact.
+inline int64_t turnOf(const Weights& a, const Weights& b, const Weights& c) {
+    const auto along = [](const Weights& from, const Weights& to, int k) { return int64_t{to.of[k]} - from.of[k]; };
+    return along(a, b, 1) * along(a, c, 2) - along(a, b, 2) * along(a, c, 1);
+}
+
+/// Returns a point's place in texels, of a triangle whose corners have these.
+glm::dvec2 placeOf(const std::array<glm::dvec2, 3>& texels, const Weights& weights);
+
 /// What a corner of a triangle has.
 struct MaskCorner {
     glm::dvec3 position;
