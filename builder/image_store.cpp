@@ -36,10 +36,14 @@ constexpr double kStoredOfJpeg = 1.5, kStoredOfPng = 0.9;
 // Time to read and code what becomes a byte of the file, on two cores.
 constexpr double kSecondsOfByte = 0.3e-6;
 
-/// Names an image by where it comes from, and what its alpha does: it is decoded once for all materials that have it.
-using ImageKey = std::tuple<std::filesystem::path, const std::string*, bool, bool>;
+/// Names an image by where it comes from, and what its alpha or its mask does: it is decoded once for all materials
+/// that have it.
+using SourceKey = std::pair<std::filesystem::path, const std::string*>;
+using ImageKey = std::tuple<SourceKey, bool, bool, SourceKey>;
+SourceKey keyOf(const ImageSource& source) { return {source.path, source.bytes.get()}; }
 ImageKey keyOf(const Material& material) {
-    return {material.image.path, material.image.bytes.get(), material.ignoresAlpha, material.isCutOut};
+    return {keyOf(material.image), material.ignoresAlpha, material.isCutOut,
+            material.isCutOut && material.ignoresAlpha ? keyOf(material.mask.image) : SourceKey()};
 }
 
 ImageWrap storedWrap(Wrap wrap) {

@@ -58,6 +58,29 @@ TEST(FilledRows, WhatIsNotQuiteTransparentKeepsItsColour) {
     for (uint32_t x = 0; x < 64; ++x) EXPECT_EQ(glass->texels[x], x % 2 == 0 ? 0xFF101010 : 0xFFF0F0F0);
 }
 
+TEST(FilledRows, AMaskOfItsOwnSaysWhatIsThere) {
+    // White all around, as the alpha of another image says, which is half as large; or as its grey says.
+    const auto colour = [](uint32_t x, uint32_t) -> Rgba8 { return x < 32 ? kGreen : 0xFFFFFFFF; };
+    const auto alpha = [](uint32_t x, uint32_t) -> Rgba8 { return x < 16 ? 0xFF000000 : 0; };
+    Material material = materialOf(64, 64, colour);
+    material.ignoresAlpha = true;
+    material.mask.image.bytes = materialOf(32, 32, alpha).image.bytes;
+    EXPECT_EQ(loadImage(material)->texels, std::vector<Rgba8>(64 * 64, kGreen));
+    std::string rows;
+    for (int y = 0; y < 32; ++y) rows += '\0' + std::string(16, char(255)) + std::string(16, '\0');
+    material.mask.image.bytes = std::make_shared<const std::string>(test::pngFile(32, 32, 8, 0, rows));
+    EXPECT_EQ(loadImage(material)->texels, std::vector<Rgba8>(64 * 64, kGreen));
+    const auto grey = [](uint32_t x, uint32_t) -> Rgba8 { return x < 16 ? 0xFFFFFFFF : 0xFF000000; };
+    material.mask.image.bytes = materialOf(32, 32, grey).image.bytes;
+    EXPECT_EQ(loadImage(material)->texels, std::vector<Rgba8>(64 * 64, kGreen));
+    // Over other coordinates, or broken, it says nothing.
+    material.mask.uvScale = {2, 1};
+    EXPECT_EQ(loadImage(material)->texels[40], 0xFFFFFFFF);
+    material.mask.uvScale = {1, 1};
+    material.mask.image.bytes = std::make_shared<const std::string>("broken");
+    EXPECT_EQ(loadImage(material)->texels[40], 0xFFFFFFFF);
+}
+
 TEST(FilledRows, AnImageWithoutAnythingIsOpaqueAndOneThatIsNotCutStaysAsItIs) {
     const auto nothing = [](uint32_t, uint32_t) -> Rgba8 { return 0x00FFFFFF; };
     Material material = materialOf(20, 20, nothing);
