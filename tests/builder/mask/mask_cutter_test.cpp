@@ -348,15 +348,15 @@ TEST_F(MaskCutterTest, WorkAndPartsAreBounded) {
 }
 
 /// Discs in rows and columns, each in a square of 64 texels.
-uint8_t discs(uint32_t x, uint32_t y) { return disc(30, 34, 25)(x % 64, y % 64); }
+uint8_t rowsOfDiscs(uint32_t x, uint32_t y) { return disc(30, 34, 25)(x % 64, y % 64); }
 
 TEST_F(MaskCutterTest, AnAtlasIsAsSharpAsItsTexels) {
-    const Picture atlas{1024, 1024, discs};
+    const Picture atlas{1024, 1024, rowsOfDiscs};
     for (const Uv& uv : {kLower, kUpper}) {
         const MaskParts* const parts = cut(atlas, uv);
         ASSERT_NE(parts, nullptr);
         check(atlas, uv, *parts);
-        EXPECT_GT(parts->triangles.size(), 128 * 8u) << "there are 128 discs, and 16 halves";
+        EXPECT_GT(parts->triangles.size(), 128 * 8u) << "there are 128 rowsOfDiscs, and 16 halves";
         EXPECT_LT(parts->triangles.size(), 4096u);
     }
 }

@@ -13,7 +13,7 @@ using ColourAt = std::function<Rgba8(uint32_t x, uint32_t y)>;
 
 constexpr Rgba8 kGreen = 0xFF20A040, kRed = 0xFF1010C0;
 
-Material materialOf(uint32_t width, uint32_t height, const ColourAt& colour) {
+Material cutOutMaterial(uint32_t width, uint32_t height, const ColourAt& colour) {
     std::string rows;
     for (uint32_t y = 0; y < height; ++y) {
         rows += '\0';
@@ -32,7 +32,7 @@ TEST(FilledRows, TransparentTexelsTakeTheColourOfTheLeastBlockAboutThem) {
         if (y % 4 != 1) return 0;
         return x < 40 ? kGreen : x >= 88 ? kRed : 0;
     };
-    const auto image = loadImage(materialOf(128, 70, colour));
+    const auto image = loadImage(cutOutMaterial(128, 70, colour));
     ASSERT_TRUE(image.ok());
     for (uint32_t y = 0; y < 70; ++y)
         for (uint32_t x = 0; x < 128; ++x) {
@@ -47,13 +47,13 @@ TEST(FilledRows, TransparentTexelsTakeTheColourOfTheLeastBlockAboutThem) {
 
 TEST(FilledRows, WhatIsNotQuiteTransparentKeepsItsColour) {
     const auto colour = [](uint32_t x, uint32_t) -> Rgba8 { return (kGreen & 0xFFFFFF) | Rgba8(x) << 24; };
-    const Material material = materialOf(256, 1, colour);
+    const Material material = cutOutMaterial(256, 1, colour);
     const auto filled = loadImage(material);
     ASSERT_TRUE(filled.ok());
     for (uint32_t x = 0; x < 256; ++x) EXPECT_EQ(filled->texels[x], kGreen) << x;
     // Glass: here dark, there light.
     const auto glass = loadImage(
-        materialOf(64, 64, [](uint32_t x, uint32_t) -> Rgba8 { return x % 2 == 0 ? 0x50101010 : 0x50F0F0F0; }));
+        cutOutMaterial(64, 64, [](uint32_t x, uint32_t) -> Rgba8 { return x % 2 == 0 ? 0x50101010 : 0x50F0F0F0; }));
     ASSERT_TRUE(glass.ok());
     for (uint32_t x = 0; x < 64; ++x) EXPECT_EQ(glass->texels[x], x % 2 == 0 ? 0xFF101010 : 0xFFF0F0F0);
 }
@@ -62,16 +62,16 @@ TEST(FilledRows, AMaskOfItsOwnSaysWhatIsThere) {
     // White all around, as the alpha of another image says, which is half as large; or as its grey says.
     const auto colour = [](uint32_t x, uint32_t) -> Rgba8 { return x < 32 ? kGreen : 0xFFFFFFFF; };
     const auto alpha = [](uint32_t x, uint32_t) -> Rgba8 { return x < 16 ? 0xFF000000 : 0; };
-    Material material = materialOf(64, 64, colour);
+    Material material = cutOutMaterial(64, 64, colour);
     material.ignoresAlpha = true;
-    material.mask.image.bytes = materialOf(32, 32, alpha).image.bytes;
+    material.mask.image.bytes = cutOutMaterial(32, 32, alpha).image.bytes;
     EXPECT_EQ(loadImage(material)->texels, std::vector<Rgba8>(64 * 64, kGreen));
     std::string rows;
     for (int y = 0; y < 32; ++y) rows += '\0' + std::string(16, char(255)) + std::string(16, '\0');
     material.mask.image.bytes = std::make_shared<const std::string>(test::pngFile(32, 32, 8, 0, rows));
     EXPECT_EQ(loadImage(material)->texels, std::vector<Rgba8>(64 * 64, kGreen));
     const auto grey = [](uint32_t x, uint32_t) -> Rgba8 { return x < 16 ? 0xFFFFFFFF : 0xFF000000; };
-    material.mask.image.bytes = materialOf(32, 32, grey).image.bytes;
+    material.mask.image.bytes = cutOutMaterial(32, 32, grey).image.bytes;
     EXPECT_EQ(loadImage(material)->texels, std::vector<Rgba8>(64 * 64, kGreen));
     // Over other coordinates, or broken, it says nothing.
     material.mask.uvScale = {2, 1};
@@ -83,7 +83,7 @@ TEST(FilledRows, AMaskOfItsOwnSaysWhatIsThere) {
 
 TEST(FilledRows, AnImageWithoutAnythingIsOpaqueAndOneThatIsNotCutStaysAsItIs) {
     const auto nothing = [](uint32_t, uint32_t) -> Rgba8 { return 0x00FFFFFF; };
-    Material material = materialOf(20, 20, nothing);
+    Material material = cutOutMaterial(20, 20, nothing);
     const auto filled = loadImage(material);
     ASSERT_TRUE(filled.ok());
     for (const Rgba8 texel : filled->texels) EXPECT_EQ(texel, 0xFF000000);
@@ -93,7 +93,7 @@ TEST(FilledRows, AnImageWithoutAnythingIsOpaqueAndOneThatIsNotCutStaysAsItIs) {
 
 TEST(FilledRows, ReadsRowsHoweverManyAtATimeAndSaysWhatIsDamaged) {
     const auto colour = [](uint32_t x, uint32_t y) -> Rgba8 { return x < y ? kGreen : 0x00FFFFFF; };
-    Material material = materialOf(50, 60, colour);
+    Material material = cutOutMaterial(50, 60, colour);
     const auto whole = loadImage(material);
     const auto rows = openImage(material);
     ASSERT_TRUE(whole.ok() && rows.ok());
