@@ -674,6 +674,7 @@ private:
                                            return progress("writing", 1 - kWritingShare + kWritingShare * part);
                                        }));
         describe(header, report_);
+        report_.cutTriangles = measures_.cutTriangles;
         progress("done", 1);
         return {};
     }

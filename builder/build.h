@@ -80,6 +80,7 @@ struct BuildOptions {
     std::optional<bool> keepImages;
     ImageQuality imageQuality;
     VertexNormals vertexNormals = VertexNormals::Mesh;
+    bool masks = true;  ///< what the alpha of materials leaves out is no surface (MaskRule); false: it is
     /// Is given what is read, for a picture meanwhile (mesh_sample.h); nothing where work is resumed. May be empty.
     std::shared_ptr<MeshSample> sample;
     /// Called from one thread at a time, about ten times a second and whenever a stage begins. Returning false cancels;
@@ -91,7 +92,7 @@ struct BuildOptions {
 inline bool keepsImages(const BuildOptions& options) { return options.keepImages.value_or(options.error == 0); }
 
 struct BuildFigures {
-    uint64_t triangles = 0;            ///< triangles read
+    uint64_t triangles = 0;            ///< triangles read, and parts of those that masks cut
     uint64_t degenerateTriangles = 0;  ///< those among them without area
     uint64_t vertices = 0;
     double seconds = 0;
@@ -108,6 +109,7 @@ struct BuildFigures {
 };
 
 struct BuildReport : BuildFigures {
+    uint64_t cutTriangles = 0;          ///< triangles of the inputs that masks cut, or cut out
     std::vector<std::string> warnings;  ///< one line for each thing that was left out of the inputs
     std::vector<SideFile> sideFiles;    ///< files that the inputs name, each once
 };

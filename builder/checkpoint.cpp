@@ -14,7 +14,7 @@ namespace {
 using nlohmann::json;
 
 // Version of the temporary files; a build does not continue from another version's.
-constexpr int kTempVersion = 15;
+constexpr int kTempVersion = 16;
 
 json jsonOf(glm::dvec3 v) { return {v.x, v.y, v.z}; }
 
@@ -85,6 +85,7 @@ SoupMeasures measuresFrom(Fields& all) {
     m.length = from.number("length");
     m.triangles = from.count("triangles");
     m.degenerateTriangles = from.count("degenerate");
+    m.cutTriangles = from.count("cut");
     m.vertices = from.count("vertices");
     m.hasVertexColours = from.truth("vertex colours");
     m.hasMaterials = from.truth("materials");
@@ -195,10 +196,10 @@ Result<void> reopenSpools(std::deque<PageSpool>& spools, const SpoolLengths& len
 std::string settingsText(const BuildOptions& options) {
     // How images are coded matters where some are kept.
     const ImageQuality quality = keepsImages(options) ? options.imageQuality : ImageQuality();
-    return fmt::format("{} {:a} {:a} {} {} {} {} {} {} {} {}", kFileVersion, options.cell, options.error,
+    return fmt::format("{} {:a} {:a} {} {} {} {} {} {} {} {} {}", kFileVersion, options.cell, options.error,
                        options.errorIsRelative, int(options.colour), int(options.coarseLeaves), keepsImages(options),
                        quality.finest.value_or(-1), quality.coarser.value_or(-1), int(options.vertexNormals),
-                       options.format);
+                       options.masks, options.format);
 }
 
 std::string buildFingerprint(const BuildOptions& options) {
@@ -214,14 +215,9 @@ std::string buildFingerprint(const BuildOptions& options) {
 }
 
 json jsonOf(const SoupMeasures& m) {
-    return {{"min", jsonOf(m.boundsMin)},
-            {"max", jsonOf(m.boundsMax)},
-            {"area", m.area},
-            {"length", m.length},
-            {"triangles", m.triangles},
-            {"degenerate", m.degenerateTriangles},
-            {"vertices", m.vertices},
-            {"vertex colours", m.hasVertexColours},
+    return {{"min", jsonOf(m.boundsMin)}, {"max", jsonOf(m.boundsMax)}, {"area", m.area},
+            {"length", m.length},         {"triangles", m.triangles},   {"degenerate", m.degenerateTriangles},
+            {"cut", m.cutTriangles},      {"vertices", m.vertices},     {"vertex colours", m.hasVertexColours},
             {"materials", m.hasMaterials}};
 }
 

@@ -36,10 +36,13 @@ constexpr double kSlower = 4;
 /// Measures one input's triangles as far as their vertices fit memory, and adds them to the sample.
 class Measurer {
 public:
-    Measurer(SoupMeasures& measures, BuildSample& sample, uint64_t maxVertices)
-        : measures_(measures), sample_(sample), maxVertices_(maxVertices) {}
+    /// `maskBytes`: for masks; 0: triangles stay whole.
+    Measurer(SoupMeasures& measures, BuildSample& sample, uint64_t maxVertices, uint64_t maskBytes)
+        : measures_(measures), sample_(sample), maxVertices_(maxVertices), cutter_(maskBytes), cuts_(maskBytes > 0) {}
 
-    void add(const MeshChunk& chunk) {
+    void setMaskDetail(double length) { cutter_.setDetail(length); }
+
+    void add(const MeshChunk& chunk, std::span<const Material> materials) {
         const size_t room = size_t(std::min<uint64_t>(chunk.positions.size(), maxVertices_ - positions_.size()));
         positions_.insert(positions_.end(), chunk.positions.begin(), chunk.positions.begin() + ptrdiff_t(room));
         if (!chunk.colours.empty()) {
@@ -57,30 +60,52 @@ public:
         measures_.vertices += chunk.positions.size();
         measures_.hasVertexColours |= !chunk.colours.empty();
         measures_.hasMaterials |= !chunk.materials.empty();
-        measures_.triangles += chunk.triangles.size();
+        triangles_ += chunk.triangles.size();
         for (size_t k = 0; k < chunk.triangles.size(); ++k) {
             const auto& t = chunk.triangles[k];
             if (std::max({t[0], t[1], t[2]}) >= positions_.size()) continue;
-            const glm::dvec3 &a = positions_[t[0]], &b = positions_[t[1]], &c = positions_[t[2]];
-            const double twice = glm::length(glm::cross(b - a, c - a));
-            ++measured_;
-            const double longest = longestEdge(a, b, c);
-            if (twice > 0 && std::isfinite(twice) && std::isfinite(longest)) {
-                area_.add(twice / 2);
-                length_.add(longest);
-                BuildSample::Triangle each{{a, b, c}, {colourOf(t[0]), colourOf(t[1]), colourOf(t[2])}};
-                for (size_t i = 0; i < 3; ++i) each.normal[i] = normalOf(chunk, k, i);
-                sample_.add(each);
-            } else {
-                ++measures_.degenerateTriangles;
+            ++whole_;
+            WorldTriangle<double> triangle{};
+            for (size_t i = 0; i < 3; ++i) {
+                triangle.corner[i] = positions_[t[i]];
+                triangle.colour[i] = colourOf(t[i]);
+                triangle.normal[i] = normalOf(chunk, k, i);
+                if (!chunk.uvs.empty()) triangle.uv[i] = chunk.uvs[k][i];
             }
+            const auto take = [&](const WorldTriangle<double>& part) {
+                measure(part);
+                return Result<void>();
+            };
+            if (cuts_ && !chunk.materials.empty())
+                static_cast<void>(cutByMask(cutter_, materials, chunk.materials[k], triangle, take));
+            else
+                measure(triangle);
         }
     }
     [[nodiscard]] double area() const { return area_.value(); }
     [[nodiscard]] double length() const { return length_.value(); }
     [[nodiscard]] uint64_t measured() const { return measured_; }
+    /// Triangles of the input, after cutting: about as many, where not all could be measured.
+    [[nodiscard]] uint64_t triangles() const {
+        if (whole_ == triangles_) return measured_;
+        return whole_ > 0 ? uint64_t(double(measured_) / double(whole_) * double(triangles_)) : triangles_;
+    }
 
 private:
+    void measure(const WorldTriangle<double>& t) {
+        const glm::dvec3 &a = t.corner[0], &b = t.corner[1], &c = t.corner[2];
+        const double twice = glm::length(glm::cross(b - a, c - a)), longest = longestEdge(a, b, c);
+        ++measured_;
+        if (!(twice > 0) || !std::isfinite(twice) || !std::isfinite(longest)) {
+            ++measures_.degenerateTriangles;
+            return;
+        }
+        area_.add(twice / 2);
+        length_.add(longest);
+        BuildSample::Triangle each{{a, b, c}, {t.colour[0], t.colour[1], t.colour[2]}};
+        std::copy_n(t.normal, 3, each.normal);
+        sample_.add(each);
+    }
     [[nodiscard]] Rgba8 colourOf(uint64_t vertex) const {
         return vertex < colours_.size() ? colours_[vertex] : Rgba8(255);
     }
@@ -93,7 +118,10 @@ private:
     SoupMeasures& measures_;
     BuildSample& sample_;
     uint64_t maxVertices_;
-    uint64_t measured_ = 0;
+    MaskCutter cutter_;
+    bool cuts_;
+    uint64_t triangles_ = 0, whole_ = 0;  ///< of the input: all, and those whose vertices are known
+    uint64_t measured_ = 0;               ///< what is left of the latter
     std::vector<glm::dvec3> positions_;
     std::vector<Rgba8> colours_;     ///< of the first positions; white beyond
     std::vector<uint32_t> normals_;  ///< likewise; unknown beyond
@@ -171,12 +199,22 @@ Result<BuildEstimate> estimateBuild(const BuildOptions& options) {
     VCP_TRY_ASSIGN(auto inputs, expandInputs(options.inputs));
     for (const auto& path : inputs) {
         VCP_TRY_ASSIGN(auto stream, openMesh(path, meshOptionsOf(options)));
-        Measurer measurer(m, sample, plan.vertexBytes / (sizeof(glm::dvec3) + sizeof(Rgba8) + sizeof(uint32_t)));
+        Measurer measurer(m, sample, plan.vertexBytes / (sizeof(glm::dvec3) + sizeof(Rgba8) + sizeof(uint32_t)),
+                          options.masks ? plan.vertexBytes / 4 : 0);
+        if (options.masks && std::ranges::any_of(stream->materials(), mayCut)) {
+            const auto goesOn = [&] {
+                return !options.progress ||
+                       options.progress({.stage = "reading", .fraction = 0, .triangles = m.triangles});
+            };
+            VCP_TRY_ASSIGN(const double detail, maskDetailOf(path, options, goesOn));
+            measurer.setMaskDetail(detail);
+        }
         for (;;) {
             VCP_TRY_ASSIGN(auto more, stream->next(chunk));
             if (!more) break;
-            measurer.add(chunk);
-            if (options.progress && !options.progress({.stage = "reading", .fraction = 0, .triangles = m.triangles}))
+            measurer.add(chunk, stream->materials());
+            const uint64_t triangles = m.triangles + measurer.triangles();
+            if (options.progress && !options.progress({.stage = "reading", .fraction = 0, .triangles = triangles}))
                 return Error::cancelled();
         }
         if (keepsImages(options)) {
@@ -184,6 +222,7 @@ Result<BuildEstimate> estimateBuild(const BuildOptions& options) {
             imageMemory = std::max(imageMemory, expectedImageMemory(stream->materials(), plan.vertexBytes));
         }
         measured += measurer.measured();
+        m.triangles += measurer.triangles();
         m.area += measurer.area();
         m.length += measurer.length();
     }

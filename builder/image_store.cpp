@@ -8,6 +8,7 @@
 #include <numeric>
 #include <optional>
 #include <set>
+#include <tuple>
 
 #include <fmt/format.h>
 #include <oneapi/tbb/parallel_for.h>
@@ -35,9 +36,15 @@ constexpr double kStoredOfJpeg = 1.5, kStoredOfPng = 0.9;
 // Time to read and code what becomes a byte of the file, on two cores.
 constexpr double kSecondsOfByte = 0.3e-6;
 
-/// Names an image by where it comes from: it is decoded once for all materials that have it.
-using ImageKey = std::pair<std::filesystem::path, const std::string*>;
-ImageKey keyOf(const ImageSource& source) { return {source.path, source.bytes.get()}; }
+/// Names an image by where it comes from, and what its alpha or its mask does: it is decoded once for all materials
+/// that have it.
+using SourceKey = std::pair<std::filesystem::path, const std::string*>;
+using ImageKey = std::tuple<SourceKey, bool, bool, SourceKey>;
+SourceKey keyOf(const ImageSource& source) { return {source.path, source.bytes.get()}; }
+ImageKey keyOf(const Material& material) {
+    return {keyOf(material.image), material.ignoresAlpha, material.isCutOut,
+            material.isCutOut && material.ignoresAlpha ? keyOf(material.mask.image) : SourceKey()};
+}
 
 ImageWrap storedWrap(Wrap wrap) {
     return wrap == Wrap::Clamp ? ImageWrap::Clamp : wrap == Wrap::Mirror ? ImageWrap::Mirror : ImageWrap::Repeat;
@@ -170,7 +177,7 @@ struct ImageStore {
     [[nodiscard]] Result<std::optional<ImageRow>> add(const Material& material, uint64_t firstTile,
                                                       const std::function<bool(double)>& progress) const {
         if (!progress(0)) return Error::cancelled();
-        const auto opened = openImage(material.image);
+        const auto opened = openImage(material);
         if (!opened) return std::optional<ImageRow>();
         if (const auto tooLarge = tooLargeFor(imageBytes, material.image, **opened)) {
             if (options.keepImages) return *tooLarge;
@@ -202,7 +209,7 @@ Result<std::vector<PlacedMaterial>> storeImages(std::span<const Material> materi
     for (size_t i = 0; i < materials.size(); ++i) {
         const Material& material = materials[i];
         if (!material.image.exists()) continue;
-        const auto [number, isNew] = numbers.try_emplace(keyOf(material.image));
+        const auto [number, isNew] = numbers.try_emplace(keyOf(material));
         if (isNew) {
             const auto part = [&](double done) { return progress((double(i) + done) / double(materials.size())); };
             VCP_TRY_ASSIGN(const auto row, store.add(material, tiles, part));
@@ -239,7 +246,7 @@ uint64_t expectedImageBytes(std::span<const Material> materials) {
                                                : std::filesystem::file_size(material.image.path, missing);
         const bool isPng = material.image.bytes ? material.image.bytes->starts_with("\x89PNG")
                                                 : material.image.path.extension() == ".png";
-        bytes[keyOf(material.image)] = missing ? 0 : (isPng ? kStoredOfPng : kStoredOfJpeg) * double(size);
+        bytes[keyOf(material)] = missing ? 0 : (isPng ? kStoredOfPng : kStoredOfJpeg) * double(size);
     }
     return uint64_t(std::accumulate(bytes.begin(), bytes.end(), 0.0,
                                     [](double sum, const auto& image) { return sum + image.second; }));
@@ -249,8 +256,8 @@ uint64_t expectedImageMemory(std::span<const Material> materials, uint64_t textu
     std::set<ImageKey> known;
     uint64_t rows = 0, textures = 0;
     for (const Material& material : materials) {
-        if (!material.image.exists() || !known.insert(keyOf(material.image)).second) continue;
-        const auto image = openImage(material.image);
+        if (!material.image.exists() || !known.insert(keyOf(material)).second) continue;
+        const auto image = openImage(material);
         if (!image) continue;
         rows = std::max(rows, memoryFor(**image));
         textures += Texture::bytesOf((*image)->size());

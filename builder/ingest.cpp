@@ -162,8 +162,9 @@ private:
 Result<SoupMeasures> readInputs(const BuildOptions& options, TempSpace& space, uint64_t vertexBytes, Soup& soup,
                                 const std::function<bool(double, uint64_t)>& progress,
                                 std::vector<std::string>& warnings, std::vector<SideFile>& sideFiles) {
-    uint64_t totalBytes = 0, doneBytes = 0, vertices = 0;
+    uint64_t totalBytes = 0, doneBytes = 0, vertices = 0, cutTriangles = 0;
     bool hasVertexColours = false;
+    const bool isPainted = options.colour == ColourChoice::Auto || options.colour == ColourChoice::Texture;
     std::set<std::filesystem::path> named;
     for (const auto& path : options.inputs) {
         std::error_code ignored;
@@ -174,7 +175,25 @@ Result<SoupMeasures> readInputs(const BuildOptions& options, TempSpace& space, u
     for (const auto& path : options.inputs) {
         VCP_TRY_ASSIGN(auto stream, openMesh(path, meshOptionsOf(options)));
         const auto materialBase = uint32_t(soup.materials.size());
-        VertexJoin join(space, vertexBytes, [&](const WorldTriangle<double>& t) { return writer.add(t); });
+        MaskCutter cutter(vertexBytes / 4);
+        const auto take = [&](const WorldTriangle<double>& t) {
+            if (isPainted) return writer.add(t);
+            WorldTriangle<double> plain = t;
+            plain.material = 0;
+            std::fill_n(plain.uv, 3, glm::vec2(0));
+            return writer.add(plain);
+        };
+        const bool hasMasks = options.masks && std::ranges::any_of(stream->materials(), mayCut);
+        if (hasMasks) {
+            const double fraction = totalBytes > 0 ? std::min(double(doneBytes) / double(totalBytes), 1.0) : 0;
+            const auto goesOn = [&] { return progress(fraction, writer.triangles()); };
+            VCP_TRY_ASSIGN(const double detail, maskDetailOf(path, options, goesOn));
+            cutter.setDetail(detail);
+        }
+        VertexJoin join(space, vertexBytes, [&](const WorldTriangle<double>& t) {
+            if (!hasMasks || t.material <= materialBase) return take(t);
+            return cutByMask(cutter, stream->materials(), t.material - materialBase - 1, t, take);
+        });
         for (;;) {
             VCP_TRY_ASSIGN(auto more, stream->next(chunk));
             if (!more) break;
@@ -191,11 +210,18 @@ Result<SoupMeasures> readInputs(const BuildOptions& options, TempSpace& space, u
             if (!progress(fraction, writer.triangles())) return Error::cancelled();
         }
         doneBytes += stream->bytesRead();
-        soup.materials.insert(soup.materials.end(), stream->materials().begin(), stream->materials().end());
+        if (isPainted) {
+            for (const Material& material : stream->materials()) {
+                soup.materials.push_back(material);
+                soup.materials.back().isCutOut = hasMasks && material.mask.image.exists();
+            }
+        }
         warnings.insert(warnings.end(), stream->warnings().begin(), stream->warnings().end());
         for (const SideFile& each : stream->sideFiles())
             if (named.insert(each.path).second) sideFiles.push_back(each);
         VCP_TRY(join.finish(path.string()));
+        warnings.insert(warnings.end(), cutter.warnings().begin(), cutter.warnings().end());
+        cutTriangles += cutter.cutTriangles();
         vertices += join.vertices();
     }
     VCP_TRY(writer.flush());
@@ -204,11 +230,14 @@ Result<SoupMeasures> readInputs(const BuildOptions& options, TempSpace& space, u
 
     SoupMeasures m = writer.measures();
     m.vertices = vertices;
+    m.cutTriangles = cutTriangles;
     m.hasVertexColours = hasVertexColours;
     m.hasMaterials = std::any_of(soup.materials.begin(), soup.materials.end(), [](const Material& material) {
         return material.factor != kWhite || material.image.exists();
     });
-    if (m.triangles == 0) return badInput(options, "has no triangles");
+    if (m.triangles == 0)
+        return badInput(options, cutTriangles > 0 ? "has no triangles but those that masks cut out; keep them whole"
+                                                  : "has no triangles");
     if (writer.tooLarge() || !(glm::length(m.boundsMax - m.boundsMin) < kMaxExtent) || !std::isfinite(m.area))
         return badInput(options, "its coordinates are too large to measure lengths; scale the mesh down");
     if (m.triangles == m.degenerateTriangles || m.area == 0)
@@ -220,10 +249,27 @@ Result<SoupMeasures> readInputs(const BuildOptions& options, TempSpace& space, u
     return m;
 }
 
+Result<double> maskDetailOf(const std::filesystem::path& path, const BuildOptions& options,
+                            const std::function<bool()>& progress) {
+    std::error_code ignored;
+    if (!std::filesystem::is_regular_file(path, ignored)) return 0.0;
+    MeshOpenOptions open = meshOptionsOf(options);
+    open.materials = false;
+    VCP_TRY_ASSIGN(const auto stream, openMesh(path, open));
+    MaskDetail detail;
+    MeshChunk chunk;
+    for (;;) {
+        VCP_TRY_ASSIGN(const bool more, stream->next(chunk));
+        if (!more) return detail.length();
+        detail.add(chunk.positions);
+        if (!progress()) return Error::cancelled();
+    }
+}
+
 MeshOpenOptions meshOptionsOf(const BuildOptions& options) {
     MeshOpenOptions open;
     open.format = options.format;
-    open.materials = options.colour == ColourChoice::Auto || options.colour == ColourChoice::Texture;
+    open.materials = options.masks || options.colour == ColourChoice::Auto || options.colour == ColourChoice::Texture;
     return open;
 }
 

@@ -11,6 +11,8 @@
 
 #include "builder/build.h"
 #include "builder/lattice/soup.h"
+#include "builder/mask/mask_cutter.h"
+#include "builder/mask/mask_detail.h"
 #include "builder/spill/record_bins.h"
 #include "builder/stream/material.h"
 #include "builder/stream/mesh_stream.h"
@@ -41,6 +43,7 @@ struct SoupMeasures {
     double length = 0;  ///< sum of the triangles' longest edges
     uint64_t triangles = 0;
     uint64_t degenerateTriangles = 0;  ///< those among them without area in the file's own coordinates
+    uint64_t cutTriangles = 0;         ///< of the inputs, that masks cut into some of them, or cut out
     uint64_t vertices = 0;
     bool hasVertexColours = false;
     bool hasMaterials = false;  ///< some have a colour other than white, or an image
@@ -61,12 +64,43 @@ struct Soup {
     std::vector<Material> materials;  ///< materials of all inputs
 };
 
-/// Reads all inputs into `soup` (flushed). `vertexBytes`: memory for the vertices of one input. `progress` is given the
-/// fraction read; false cancels. Triangles without area are counted and left out. `warnings` lists what the readers
+/// Reads all inputs into `soup` (flushed), cut by the masks of their materials. `vertexBytes`: memory for the vertices
+/// of one input; masks take up to a quarter as much beside them. An input with masks is read twice. `progress` is given
+/// the fraction read; false cancels. Triangles without area are counted and left out. `warnings` lists what the readers
 /// left out, `sideFiles` the files that the inputs name, each once. Uses the calling arena's threads.
 Result<SoupMeasures> readInputs(const BuildOptions& options, TempSpace& space, uint64_t vertexBytes, Soup& soup,
                                 const std::function<bool(double fraction, uint64_t triangles)>& progress,
                                 std::vector<std::string>& warnings, std::vector<SideFile>& sideFiles);
+
+/// Returns what MaskCutter::setDetail() is to be given for an input with masks, whose vertices are read for that; 0
+/// where it can be read only once. `progress` returning false cancels. Errors: as those of MeshStream.
+Result<double> maskDetailOf(const std::filesystem::path& path, const BuildOptions& options,
+                            const std::function<bool()>& progress);
+
+/// Gives what a mask leaves of a triangle of `materials[number]` to `take`, which returns a Result<void>.
+template <class Take>
+Result<void> cutByMask(MaskCutter& cutter, std::span<const Material> materials, uint32_t number,
+                       const WorldTriangle<double>& triangle, Take&& take) {
+    const MaskParts* const parts =
+        cutter.partsOf(materials, number, {triangle.uv[0], triangle.uv[1], triangle.uv[2]},
+                       triangleArea(triangle.corner[0], triangle.corner[1], triangle.corner[2]));
+    if (parts == nullptr) return take(triangle);
+    std::array<MaskCorner, 3> corners;
+    for (size_t i = 0; i < 3; ++i)
+        corners[i] = {triangle.corner[i], triangle.uv[i], triangle.colour[i], triangle.normal[i]};
+    for (const auto& t : parts->triangles) {
+        WorldTriangle<double> part = triangle;
+        for (size_t i = 0; i < 3; ++i) {
+            const MaskCorner point = blend(corners, parts->points[t[i]]);
+            part.corner[i] = point.position;
+            part.uv[i] = point.uv;
+            part.colour[i] = point.colour;
+            part.normal[i] = point.normal;
+        }
+        VCP_TRY(take(part));
+    }
+    return {};
+}
 
 /// Returns how the inputs are opened.
 MeshOpenOptions meshOptionsOf(const BuildOptions& options);

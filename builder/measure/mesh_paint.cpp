@@ -27,9 +27,11 @@ uint32_t wrappedTexel(double at, uint32_t size, Wrap wrap) {
 }
 
 /// Returns a name of what an image is made of: it is decoded once for all materials that have it.
-std::string keyOf(const ImageSource& source) {
-    return source.bytes ? "bytes " + std::to_string(reinterpret_cast<uintptr_t>(source.bytes.get()))
-                        : source.path.string();
+std::string keyOf(const Material& material) {
+    const ImageSource& source = material.image;
+    return (material.ignoresAlpha ? "opaque " : "with alpha ") +
+           (source.bytes ? "bytes " + std::to_string(reinterpret_cast<uintptr_t>(source.bytes.get()))
+                         : source.path.string());
 }
 
 uint64_t storedBytesOf(const ImageSource& source) {
@@ -77,12 +79,12 @@ void MeshPaint::loadImages(const ImageLimits& limits) {
     for (size_t i = 0; i < materials_.size(); ++i) {
         const ImageSource& source = materials_[i].image;
         if (!source.exists()) continue;
-        const auto [at, isNew] = first.try_emplace(keyOf(source), i);
+        const auto [at, isNew] = first.try_emplace(keyOf(materials_[i]), i);
         if (!isNew) {
             images_[i] = images_[at->second];
             continue;
         }
-        auto image = loadImage(source, limits);
+        auto image = loadImage(materials_[i], limits);
         if (!image) {
             warnings_.push_back(image.error().line());
             continue;

@@ -93,12 +93,15 @@ private:
                 if (!words.takeNumber(channel)) return;
             current_.material.factor = packRgba({toByte(rgb[0]), toByte(rgb[1]), toByte(rgb[2]), 255});
         } else if (keyword == "map_Kd") {
-            readImage(words);
+            readImage(words, current_.material.image, current_.uvScale, current_.uvOffset);
+        } else if (keyword == "map_d") {
+            MaskRule& mask = current_.material.mask;
+            readImage(words, mask.image, mask.uvScale, mask.uvOffset);
         }
     }
 
-    void readImage(Words& words) {
-        while (words.peek().starts_with('-')) readOption(words);
+    void readImage(Words& words, ImageSource& image, glm::vec2& uvScale, glm::vec2& uvOffset) {
+        while (words.peek().starts_with('-')) readOption(words, uvScale, uvOffset);
         const std::string name = words.rest();
         if (name.empty()) return;
         const auto path = nameBelow(path_.parent_path(), name);
@@ -109,10 +112,10 @@ private:
         else if (!std::filesystem::is_regular_file(*path, ignored))
             warn(fmt::format("the image {} is missing; it is left out", shown(name)));
         else
-            current_.material.image.path = *path;
+            image.path = *path;
     }
 
-    void readOption(Words& words) {
+    void readOption(Words& words, glm::vec2& uvScale, glm::vec2& uvOffset) {
         const std::string_view option = words.take();
         if (option == "-o" || option == "-s" || option == "-t") {
             std::array<double, 3> numbers{0, option == "-s" ? 1.0 : 0.0, 0};
@@ -120,8 +123,8 @@ private:
                 if (!words.takeNumber(number)) break;
             const glm::vec2 pair{float(numbers[0]), float(numbers[1])};
             if (!std::isfinite(pair.x) || !std::isfinite(pair.y)) return;
-            if (option == "-o") current_.uvOffset = pair;
-            if (option == "-s") current_.uvScale = pair;
+            if (option == "-o") uvOffset = pair;
+            if (option == "-s") uvScale = pair;
         } else if (option == "-mm") {
             words.take();
             words.take();
@@ -136,7 +139,28 @@ private:
         open_ = false;
         if (materials_.size() == kMostMaterials) return warn("more than 65536 materials; the rest is left out");
         if (current_.material.image.exists()) current_.material.factor = kWhite;
+        settleMask();
         materials_.push_back(std::move(current_));
+    }
+
+    /// Brings the mask's texture coordinates from the file's to those of the material's triangles, v growing downwards.
+    void settleMask() {
+        Material& material = current_.material;
+        MaskRule& mask = material.mask;
+        mask.sparesGlass = true;
+        mask.mayBeGrey = material.ignoresAlpha = mask.image.exists();
+        if (!mask.image.exists()) {
+            mask = {.image = material.image, .sparesGlass = true};
+            return;
+        }
+        if (!material.image.exists()) {
+            current_.uvScale = std::exchange(mask.uvScale, glm::vec2(1));
+            current_.uvOffset = std::exchange(mask.uvOffset, glm::vec2(0));
+            return;
+        }
+        const glm::vec2 scale = mask.uvScale / current_.uvScale, offset = mask.uvOffset - current_.uvOffset * scale;
+        mask.uvScale = scale;
+        mask.uvOffset = {offset.x, 1 - scale.y - offset.y};
     }
 
     std::filesystem::path path_;

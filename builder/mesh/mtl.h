@@ -1,8 +1,9 @@
 // Wavefront MTL: the materials of an OBJ file, as far as the colour of a surface goes.
 //
-// Reads `newmtl`, `Kd` and `map_Kd` with its options -o, -s and -clamp; other statements are skipped. Where there is an
-// image, it is the colour: Kd is ignored then, as many exporters leave a grey one behind. Images lie below the folder
-// of the MTL file; others are left out with a warning, as are faulty statements.
+// Reads `newmtl`, `Kd`, and `map_Kd` and `map_d` with their options -o, -s and -clamp; other statements are skipped.
+// Where there is an image, it is the colour: Kd is ignored then, as many exporters leave a grey one behind. `map_d` is
+// a mask, by its alpha or, where it is opaque, its grey; without one, the alpha of `map_Kd` is. Images lie below the
+// folder of the MTL file; others are left out with a warning, as are faulty statements.
 #pragma once
 
 #include <filesystem>

@@ -28,7 +28,7 @@ public:
     void begin();
 
     [[nodiscard]] bool active() const { return active_; }
-    /// Whether texture coordinates are of use.
+    /// Whether texture coordinates are of use, for colours or for masks.
     [[nodiscard]] bool hasImages() const { return hasImages_; }
 
     void use(std::string_view name);

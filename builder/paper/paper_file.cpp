@@ -148,7 +148,7 @@ Result<BuildReport> buildPaperFile(const BuildOptions& options, const PaperOptio
     const Stages stages(options);
     VCP_TRY(stages.at("reading", 0));
     VCP_TRY_ASSIGN(const auto inputs, expandInputs(options.inputs));
-    VCP_TRY_ASSIGN(const auto mesh, loadMesh(inputs));
+    VCP_TRY_ASSIGN(const auto mesh, loadMesh(inputs, {.masks = options.masks}));
     const SoupMeasures measures = measuresOf(mesh);
     if (!(measures.area > 0))
         return Error{.code = ErrorCode::InvalidInput,

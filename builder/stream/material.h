@@ -7,6 +7,8 @@
 #include <string>
 #include <variant>
 
+#include <glm/vec2.hpp>
+
 namespace vcp {
 
 /// A colour as it is shown (sRGB encoded), 8 bits a channel, R in the lowest byte; alpha is 255 where there is none.
@@ -24,10 +26,28 @@ struct ImageSource {
     [[nodiscard]] bool exists() const { return !path.empty() || bytes; }
 };
 
+/// What of a material's triangles is there: where the alpha of an image is at least a cutoff. What is cut out is no
+/// surface (builder/mask/).
+struct MaskRule {
+    ImageSource image;  ///< none: all is there
+    /// From 0 to 1, of the image's alpha; above 1: nothing is there, whatever the image.
+    double cutoff = 0.5;
+    /// An image that is nowhere as opaque as the cutoff cuts nothing: glass.
+    bool sparesGlass = false;
+    /// Where the image is opaque throughout, its grey counts instead.
+    bool mayBeGrey = false;
+    glm::vec2 uvScale{1}, uvOffset{0};  ///< from the triangles' texture coordinates to the mask's
+
+    [[nodiscard]] bool exists() const { return image.exists() || cutoff > 1; }
+};
+
 struct Material {
     std::string name;
-    Rgba8 factor = kWhite;  ///< multiplies the other colours
-    ImageSource image;      ///< image of the surface colour
+    Rgba8 factor = kWhite;      ///< multiplies the other colours
+    ImageSource image;          ///< image of the surface colour
+    bool ignoresAlpha = false;  ///< all of the image is opaque, whatever its alpha
+    MaskRule mask;
+    bool isCutOut = false;  ///< what is transparent was cut out of the mesh (MaskRule)
     Wrap wrapU = Wrap::Repeat;
     Wrap wrapV = Wrap::Repeat;
 };

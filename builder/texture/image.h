@@ -56,10 +56,19 @@ public:
 /// ImageRows::open() and Limit (too large a file); with the file's name.
 Result<std::unique_ptr<ImageRows>> openImage(const ImageSource& source, const ImageLimits& limits = {});
 
+/// Opens the image of a material; its texels are opaque where its alpha does not count, or was cut out (filled_rows.h).
+/// Errors: likewise.
+Result<std::unique_ptr<ImageRows>> openImage(const Material& material, const ImageLimits& limits = {});
+
+/// Whether an image may have texels that are not opaque, by the chunks of its file. False where it cannot be read.
+bool mayBeTransparent(const ImageSource& source);
+
 /// Decodes a picture as a whole; its texels are limited, too. Errors: as ImageRows'; without file.
 Result<Image> decodeImage(std::string_view file, const ImageLimits& limits = {});
 /// Decodes the one that `source` names. Errors: as ImageRows' and openImage(); with the file's name.
 Result<Image> loadImage(const ImageSource& source, const ImageLimits& limits = {});
+/// Decodes that of a material, as openImage() has it. Errors: likewise.
+Result<Image> loadImage(const Material& material, const ImageLimits& limits = {});
 
 /// Adds the file's name to an error of a picture.
 Error namedImageError(const ImageSource& source, Error error);

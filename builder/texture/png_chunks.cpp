@@ -81,6 +81,24 @@ Result<PngChunks> checkPng(RandomBytes& file) {
     return chunks;
 }
 
+bool mayHaveAlpha(RandomBytes& file) {
+    char start[kSignatureBytes];
+    if (file.size() < kSignatureBytes || !file.read(0, start, kSignatureBytes)) return false;
+    if (!std::string_view(start, kSignatureBytes).starts_with("\x89PNG")) return false;
+    for (uint64_t at = kSignatureBytes;;) {
+        const auto chunk = chunkAt(file, at);
+        if (!chunk || !chunk->isWhole || chunk->name() == "IDAT") return false;
+        if (chunk->name() == "tRNS") return true;
+        if (chunk->name() == "IHDR" && chunk->bytes == kHeaderBytes) {
+            char data[kHeaderBytes];
+            if (!file.read(at + 8, data, sizeof data)) return false;
+            // Grey with alpha, and colour with alpha.
+            if (data[9] == 4 || data[9] == 6) return true;
+        }
+        at += chunk->bytes + kFrameBytes;
+    }
+}
+
 Result<void> PngBytes::findPart() {
     if (!hasBegun_) {
         hasBegun_ = true;

@@ -24,6 +24,9 @@ struct PngChunks {
 /// one), Io.
 Result<PngChunks> checkPng(RandomBytes& file);
 
+/// Whether a file is a PNG whose texels may be transparent, by its chunks before them. False where it cannot be read.
+bool mayHaveAlpha(RandomBytes& file);
+
 /// The bytes of a PNG from its beginning, with only those chunks that say something about texels, each once. Text is
 /// left out: libpng would inflate up to 8 MB of it from 8 KB, a thousand times. Chunks that are not understood stay for
 /// libpng to refuse. One thread at a time.

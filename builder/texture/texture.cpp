@@ -7,6 +7,7 @@
 
 #include "builder/texture/level_bands.h"
 #include "builder/texture/texel_light.h"
+#include "builder/texture/texel_wrap.h"
 
 namespace vcp {
 namespace {
@@ -36,17 +37,6 @@ Ellipse ellipseOf(const TextureFootprint& footprint, const Image& finest) {
 }
 
 constexpr int kMostPlaces = 16;  // along a footprint; longer ones are taken as wider
-
-// Returns a texel's number inside 0..size-1. Any finite number of a float fits into int64_t after the clamp.
-uint32_t wrapped(double texel, uint32_t size, Wrap wrap) {
-    const double edge = size;
-    if (texel >= 0 && texel < edge) return uint32_t(texel);
-    if (wrap == Wrap::Clamp) return uint32_t(std::clamp(texel, 0.0, edge - 1));
-    const double period = wrap == Wrap::Mirror ? 2 * edge : edge;
-    double inside = texel - std::floor(texel / period) * period;
-    if (wrap == Wrap::Mirror && inside >= edge) inside = period - 1 - inside;
-    return uint32_t(std::clamp(inside, 0.0, edge - 1));
-}
 
 uint64_t texelsOf(glm::uvec2 size) { return uint64_t{size.x} * size.y; }
 
@@ -103,10 +93,10 @@ std::array<double, 4> Texture::bilinear(const Image& level, glm::dvec2 uv) const
     const double x = uv.x * level.width - 0.5, y = uv.y * level.height - 0.5;
     const double left = std::floor(x), top = std::floor(y);
     const double fx = x - left, fy = y - top;
-    const uint32_t columns[2] = {wrapped(left, level.width, wrapU_), wrapped(left + 1, level.width, wrapU_)};
+    const uint32_t columns[2] = {wrappedTexel(left, level.width, wrapU_), wrappedTexel(left + 1, level.width, wrapU_)};
     Light sum{};
     for (int j = 0; j < 2; ++j) {
-        const Rgba8* row = &level.texels[size_t{wrapped(top + j, level.height, wrapV_)} * level.width];
+        const Rgba8* row = &level.texels[size_t{wrappedTexel(top + j, level.height, wrapV_)} * level.width];
         for (int i = 0; i < 2; ++i) addTexel(sum, row[columns[i]], (i ? fx : 1 - fx) * (j ? fy : 1 - fy));
     }
     return sum;
@@ -172,7 +162,7 @@ const Texture* TextureCache::textureOf(std::span<const Material> materials, uint
 }
 
 Result<Texture> TextureCache::load(const Material& material) {
-    VCP_TRY_ASSIGN(const auto image, openImage(material.image, limits_));
+    VCP_TRY_ASSIGN(const auto image, openImage(material, limits_));
     makeRoom(Texture::bytesOf(image->size()));
     auto texture = Texture::read(*image, material.wrapU, material.wrapV);
     if (!texture) return namedImageError(material.image, texture.error());

@@ -68,6 +68,7 @@ void addBuildSettings(CLI::App& app, BuildOptions& options, const char* group) {
     addColourChoice(app, options);
     addImages(app, options);
     addVertexNormals(app, options);
+    addMasks(app, options.masks);
     addParsed(app, "--leaves", options.coarseLeaves, leavesNamed, "slabs or mesh",
               "What coarser levels are made of: slabs (one plane a cell) or mesh (triangles of clustered vertices, and "
               "vectors at corners where they suffice; always with --error)")
@@ -121,6 +122,11 @@ void addVertexNormals(CLI::App& app, BuildOptions& options) {
               "triangles around a vertex)")
         ->type_name("WHICH:{mesh,computed}")
         ->default_str("mesh");
+}
+
+void addMasks(CLI::App& app, bool& masks) {
+    app.add_flag("--masks,!--no-masks", masks,
+                 "Cut out what the alpha of materials leaves out, as of leaves and fences [on]");
 }
 
 void addFormat(CLI::App& app, BuildOptions& options) {

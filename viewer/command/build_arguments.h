@@ -21,6 +21,7 @@ void addBuildOutput(CLI::App& app, std::string& output);
 void addColourChoice(CLI::App& app, BuildOptions& options);
 void addImages(CLI::App& app, BuildOptions& options);
 void addVertexNormals(CLI::App& app, BuildOptions& options);
+void addMasks(CLI::App& app, bool& masks);
 void addFormat(CLI::App& app, BuildOptions& options);
 void addTempFolder(CLI::App& app, BuildOptions& options, const std::string& description);
 

@@ -40,6 +40,8 @@ std::string summary(const std::string& output, const BuildReport& report) {
                                    1e-6 * triangles / std::max(report.seconds, 1e-9), formatBytes(report.peakRssBytes));
     if (report.degenerateTriangles > 0)
         text += fmt::format("  left out: {} without area\n", formatCount(report.degenerateTriangles, "triangle"));
+    if (report.cutTriangles > 0)
+        text += fmt::format("  masks cut {} of the mesh\n", formatCount(report.cutTriangles, "triangle"));
     for (const std::string& warning : report.warnings) text += fmt::format("  {}\n", warning);
     text += fmt::format("  {} ({:.1f} bytes a triangle), {}, {}, {}, {} of them hard\n", formatBytes(report.fileBytes),
                         double(report.fileBytes) / triangles, formatCount(report.levels, "level"),
@@ -140,6 +142,7 @@ Result<int> run(const BuildCommand& command) {
     if (!report) return report.error();
     if (command.report.json) {
         Json json = toJson(*report);
+        json["cut_triangles"] = report->cutTriangles;
         json["warnings"] = report->warnings;
         VCP_TRY(printJson(json));
     } else {

@@ -110,6 +110,7 @@ Command addBuildPlan(CLI::App& vcp) {
     addColourChoice(*app, command->settings);
     addImages(*app, command->settings);
     addVertexNormals(*app, command->settings);
+    addMasks(*app, command->settings.masks);
     addFormat(*app, command->settings);
     addMemory(*app, command->settings.memoryBytes,
               "Memory that each part may take: 512M, 4G, 50% [half of its machine's]");

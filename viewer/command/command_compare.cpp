@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include "builder/measure/mesh_deviation.h"
+#include "viewer/command/build_arguments.h"
 #include "viewer/command/commands.h"
 #include "viewer/command/manual/help_text.h"
 #include "viewer/command/parsed_option.h"
@@ -27,6 +28,7 @@ struct CompareCommand {
     std::string csv;
     bool overwrite = false;
     bool both = false;
+    bool masks = true;
     uint64_t samples = 200'000;
     std::optional<Length> error, within, range;
     std::optional<LengthUnit> unit;
@@ -111,7 +113,7 @@ private:
         if (kind == InputKind::Scene)
             return Error{.code = ErrorCode::Usage, .message = "is a scene; give a .vcp file or a mesh", .file = input};
         if (kind == InputKind::Meshes) {
-            VCP_TRY_ASSIGN(surface.mesh, loadMesh(input, {.progress = progress(stage)}));
+            VCP_TRY_ASSIGN(surface.mesh, loadMesh(input, {.masks = command_.masks, .progress = progress(stage)}));
             return {};
         }
         VCP_TRY_ASSIGN(const auto reader, openReader(input, command_.render.source));
@@ -253,6 +255,7 @@ Command addCompare(CLI::App& vcp) {
     addOverwriteOption(*app, command->overwrite);
     beginGroup(*app, help_group::kMeasured);
     app->add_flag("--both", command->both, "Measure B from A as well");
+    addMasks(*app, command->masks);
     app->add_option("--samples", command->samples, "Points of the surface, evenly by area, for the figures")
         ->type_name("N")
         ->capture_default_str()

@@ -8,6 +8,7 @@
 #include "octree/vcp_verify.h"
 #include "streaming/http_reader.h"
 #include "streaming/read_ahead.h"
+#include "viewer/command/build_arguments.h"
 #include "viewer/command/commands.h"
 #include "viewer/command/manual/help_text.h"
 #include "viewer/command/source_arguments.h"
@@ -21,6 +22,7 @@ namespace {
 struct VerifyCommand {
     std::string file;
     std::vector<std::string> against;
+    bool masks = true;
     uint64_t samples = 200'000;
     uint32_t level = UINT32_MAX;
     unsigned threads = 0;
@@ -69,6 +71,7 @@ Result<SurfaceDistance> measure(const VerifyCommand& command) {
     const std::vector<std::filesystem::path> meshes(command.against.begin(), command.against.end());
     MeshPaint paint;
     LoadOptions load;
+    load.masks = command.masks;
     load.chunk = [&](size_t file, const MeshStream& stream, const MeshChunk& chunk) { paint.add(file, stream, chunk); };
     VCP_TRY_ASSIGN(const auto mesh, loadMesh(meshes, load));
     display.update("sorting the mesh", 0.1);
@@ -197,6 +200,7 @@ Command addVerify(CLI::App& vcp) {
     beginGroup(*app, help_group::kMeasured);
     app->add_option("--against", command->against, "The meshes it was built from: measures the distance, both ways")
         ->type_name("MESH");
+    addMasks(*app, command->masks);
     app->add_option("--samples", command->samples, "Samples, each way")
         ->type_name("N")
         ->capture_default_str()

@@ -114,10 +114,12 @@ private:
             material.wrapU = from.wrapU;
             material.wrapV = from.wrapV;
             if (from.image) material.image = images[*from.image];
+            material.ignoresAlpha = from.alphaMode == GltfAlpha::Opaque;
+            material.mask = maskOf(from, material.image);
             materials_.push_back(std::move(material));
         }
         eachPrimitive([&](const GltfPlacement&, const GltfPrimitive& primitive) {
-            info_.hasMaterials = info_.hasMaterials || hasImage(primitive);
+            info_.hasMaterials = info_.hasMaterials || hasImage(primitive) || isCutOut(primitive);
         });
         if (!info_.hasMaterials) materials_.clear();
         return {};
@@ -127,6 +129,27 @@ private:
         const bool hasUv = primitive.draco ? primitive.draco->uv.has_value() : primitive.uv.has_value();
         return hasUv && primitive.material && *primitive.material < materials_.size() &&
                materials_[*primitive.material].image.exists();
+    }
+
+    // With a mask, what is there follows from the product of the image's alpha and the factor's.
+    static MaskRule maskOf(const GltfMaterial& from, const ImageSource& image) {
+        MaskRule rule;
+        if (from.alphaMode == GltfAlpha::Opaque) return rule;
+        rule.image = image;
+        rule.sparesGlass = from.alphaMode == GltfAlpha::Blend;
+        if (from.alphaMode == GltfAlpha::Blend) return rule;
+        constexpr double kAboveAll = 2;
+        if (from.alphaCutoff > 0)
+            rule.cutoff = from.alpha > 0 ? from.alphaCutoff / from.alpha : kAboveAll;
+        else
+            rule.image = {};
+        return rule;
+    }
+
+    // Whether nothing is left of a primitive, with or without an image.
+    bool isCutOut(const GltfPrimitive& primitive) const {
+        return primitive.material && *primitive.material < materials_.size() &&
+               materials_[*primitive.material].mask.cutoff > 1;
     }
 
     Result<ImageSource> imageOf(size_t number, uint64_t& bytes) {
@@ -312,7 +335,8 @@ private:
             return;
         }
         const bool image = hasImage(primitive) && chunk.uvs.size() == chunk.triangles.size();
-        chunk.materials.assign(chunk.triangles.size(), image ? *primitive.material : kNoMaterial);
+        chunk.materials.assign(chunk.triangles.size(),
+                               image || isCutOut(primitive) ? *primitive.material : kNoMaterial);
         if (!image) {
             chunk.uvs.assign(chunk.triangles.size(), {});
             return;

@@ -76,9 +76,14 @@ struct GltfAccessor {
     [[nodiscard]] uint64_t elementBytes() const { return byteSize(type) * components; }
 };
 
+enum class GltfAlpha : uint8_t { Opaque, Mask, Blend };
+
 struct GltfMaterial {
     std::string name;
     Rgba8 factor = kWhite;  ///< base colour, sRGB encoded
+    double alpha = 1;       ///< of the base colour
+    GltfAlpha alphaMode = GltfAlpha::Opaque;
+    double alphaCutoff = 0.5;
     std::optional<uint32_t> image;
     uint32_t texCoord = 0;
     Wrap wrapU = Wrap::Repeat, wrapV = Wrap::Repeat;

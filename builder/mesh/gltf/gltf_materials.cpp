@@ -67,6 +67,7 @@ private:
     void readMaterial(const JsonFields& f) {
         GltfMaterial material;
         material.name = f.text("name");
+        readAlpha(f, material);
         const Json* const extensions = f.find("extensions");
         const Json* const old = extensions ? member(*extensions, "KHR_materials_pbrSpecularGlossiness") : nullptr;
         const Json* const current = f.find("pbrMetallicRoughness");
@@ -77,11 +78,21 @@ private:
         document_.materials.push_back(std::move(material));
     }
 
+    // What is not understood is opaque.
+    static void readAlpha(const JsonFields& f, GltfMaterial& material) {
+        const Json* const mode = f.find("alphaMode");
+        if (mode && *mode == "MASK") material.alphaMode = GltfAlpha::Mask;
+        if (mode && *mode == "BLEND") material.alphaMode = GltfAlpha::Blend;
+        const Json* const cutoff = f.find("alphaCutoff");
+        if (cutoff && cutoff->is_number()) material.alphaCutoff = cutoff->get<double>();
+    }
+
     void readBase(const Json& json, const char* factorKey, const char* textureKey, GltfMaterial& material) {
         const JsonFields f(json, where_, check_);
         std::array<double, 4> factor{1, 1, 1, 1};
         f.numbers(factorKey, factor);
         material.factor = encodeRgba(factor);
+        material.alpha = factor[3];
         const Json* const texture = f.find(textureKey);
         if (texture) readTexture(*texture, material);
     }

@@ -68,6 +68,34 @@ TEST_F(ObjMaterialFiles, TexturesComeWithCoordinatesFromTheTop) {
     EXPECT_EQ(mesh.uvs[3], (Uvs{glm::vec2(0), {2.5f, 1}, glm::vec2(0)})) << "what does not exist is 0";
 }
 
+TEST_F(ObjMaterialFiles, MasksAreMapDOrTheImageItself) {
+    write("a.png", "");
+    write("m.png", "");
+    write("m.mtl",
+          "newmtl own\nd 0.5\nmap_Kd a.png\nnewmtl both\nmap_Kd -s 2 4 1 -o 0.5 0.25 0 a.png\n"
+          "map_d -s 1 2 1 -o 0.125 0.5 0 m.png\nnewmtl alone\nmap_d -s 3 3 1 m.png\nnewmtl plain\nd 0.1\n");
+    const Painted mesh = read("mtllib m.mtl\n" + kTexturedSquare +
+                              "usemtl own\nf 1/1 2/2 3/3\nusemtl both\nf 1/1 2/2 3/3\nusemtl alone\nf 1/1 2/2 3/3\n");
+    ASSERT_EQ(mesh.list.size(), 4u);
+    EXPECT_EQ(mesh.list[0].mask.image.path, folder_ / "a.png");
+    EXPECT_FALSE(mesh.list[0].ignoresAlpha || mesh.list[0].mask.mayBeGrey);
+    EXPECT_EQ(mesh.list[1].mask.image.path, folder_ / "m.png");
+    EXPECT_TRUE(mesh.list[1].ignoresAlpha && mesh.list[1].mask.mayBeGrey);
+    EXPECT_FALSE(mesh.list[3].mask.exists());
+    // What the file's coordinates become for the mask, v growing downwards, as if nothing else had been done to them.
+    for (const size_t material : {1, 2}) {
+        const MaskRule& mask = mesh.list[material].mask;
+        const glm::vec2 scale = material == 1 ? glm::vec2(1, 2) : glm::vec2(3),
+                        offset = material == 1 ? glm::vec2(0.125f, 0.5f) : glm::vec2(0);
+        for (size_t i = 0; i < 3; ++i) {
+            const glm::vec2 own(mesh.uvs[0][i].x, 1 - mesh.uvs[0][i].y);
+            const glm::vec2 wanted = own * scale + offset, found = mesh.uvs[material][i] * mask.uvScale + mask.uvOffset;
+            EXPECT_NEAR(found.x, wanted.x, 1e-5) << material;
+            EXPECT_NEAR(found.y, 1 - wanted.y, 1e-5) << material;
+        }
+    }
+}
+
 TEST_F(ObjMaterialFiles, PlainColoursCountWhereTheyDiffer) {
     const std::string faces = kTexturedSquare + "usemtl a\nf 1 2 3\nusemtl b\nf 1 3 4\n";
     write("one.mtl", "newmtl a\nKd 0.8 0.8 0.8\nnewmtl b\nKd 0.8 0.8 0.8\n");

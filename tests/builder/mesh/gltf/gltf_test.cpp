@@ -237,6 +237,34 @@ TEST(Gltf, TexturesComeWithCoordinatesMaterialsAndWarnings) {
     EXPECT_EQ(chunk.materials, std::vector<uint32_t>{kNoMaterial});
 }
 
+TEST(Gltf, MasksComeFromAlphaMode) {
+    const auto materialOf = [](const std::string& fields) {
+        GltfFile file = oneTriangle();
+        file.floats({0, 0, 1, 0, 0, 1}, "VEC2", 3);
+        file.meshes = R"({"primitives":[{"attributes":{"POSITION":0,"TEXCOORD_0":2},"indices":1,"material":0}]})";
+        file.more = R"(,"images":[{"uri":")" + kRedPng + R"("}],"textures":[{"source":0}],"materials":[{)" + fields +
+                    R"("pbrMetallicRoughness":{"baseColorFactor":[1,1,1,0.5],"baseColorTexture":{"index":0}}}])";
+        const std::string bytes = file.embedded();
+        const auto stream = openGltfBytes(ByteSource::fromMemory(bytes, "mesh"));
+        EXPECT_TRUE(stream.ok());
+        return stream ? (*stream)->materials()[0] : Material();
+    };
+    for (const char* opaque : {"", R"("alphaMode":"OPAQUE",)", R"("alphaMode":"else",)", R"("alphaMode":3,)"}) {
+        const Material material = materialOf(opaque);
+        EXPECT_TRUE(material.ignoresAlpha && !material.mask.exists()) << opaque;
+    }
+    const Material blend = materialOf(R"("alphaMode":"BLEND","alphaCutoff":0.1,)");
+    EXPECT_TRUE(!blend.ignoresAlpha && blend.mask.exists() && blend.mask.sparesGlass);
+    EXPECT_EQ(blend.mask.cutoff, 0.5);
+    // The factor's alpha is a half.
+    const Material mask = materialOf(R"("alphaMode":"MASK","alphaCutoff":0.2,)");
+    EXPECT_TRUE(!mask.ignoresAlpha && mask.mask.exists() && !mask.mask.sparesGlass);
+    EXPECT_NEAR(mask.mask.cutoff, 0.4, 1e-9);
+    EXPECT_EQ(materialOf(R"("alphaMode":"MASK",)").mask.cutoff, 1.0);
+    EXPECT_GT(materialOf(R"("alphaMode":"MASK","alphaCutoff":0.6,)").mask.cutoff, 1.0);
+    EXPECT_FALSE(materialOf(R"("alphaMode":"MASK","alphaCutoff":0,)").mask.exists());
+}
+
 TEST(Gltf, NothingOutsideTheFolderIsOpened) {
     TestFolder folder("vcp_gltf");
     const GltfFile file = oneTriangle();
