@@ -23,20 +23,24 @@ struct Moments {
     glm::dvec3 zeroth{0};
     std::array<glm::dvec3, 3> first{};
     std::array<glm::dmat3, 3> second{};
-
-    void add(glm::dvec3 radiance, glm::dvec3 d, double solidAngle) {
-        zeroth += solidAngle * radiance;
-        for (int c = 0; c < 3; ++c) {
-            first[size_t(c)] += solidAngle * radiance[c] * d;
-            second[size_t(c)] += solidAngle * radiance[c] * glm::outerProduct(d, d);
-        }
-    }
 };
 
 /// Returns the direction of a point of the picture, each coordinate from 0 to 1, from the left and from the top.
 glm::dvec3 directionAt(double x, double y) {
     const double across = 2 * kPi * (x - 0.5), down = kPi * y;
     return {std::sin(down) * std::sin(across), std::sin(down) * std::cos(across), std::cos(down)};
+}
+
+/// Adds a row of the picture; `r`, `z`: sine and cosine of the angle from above.
+void addRow(Moments& moments, const std::array<glm::dvec3, 6>& sums, double r, double z, double texel) {
+    moments.zeroth += texel * sums[0];
+    for (int c = 0; c < 3; ++c) {
+        const auto sum = [&](size_t i) { return texel * sums[i][c]; };
+        moments.first[size_t(c)] += glm::dvec3(r * sum(1), r * sum(2), z * sum(0));
+        const double xx = r * r * sum(3), xy = r * r * sum(4), yy = r * r * sum(5), xz = r * z * sum(1),
+                     yz = r * z * sum(2), zz = z * z * sum(0);
+        moments.second[size_t(c)] += glm::dmat3(xx, xy, xz, xy, yy, yz, xz, yz, zz);
+    }
 }
 
 /// Returns the forms of light that falls by the cosine. Its clamp, max(0, t), is 1/4 + t/2 + 5/32 (3 t t - 1) in the
@@ -115,12 +119,21 @@ glm::dquat turnToZ(glm::dvec3 v) {
 }  // namespace
 
 std::optional<EnvironmentLight> environmentLight(std::span<const glm::vec3> radiance, glm::uvec2 size) {
+    std::vector<glm::dvec2> across;  // of each column: what x and y are of the sine of the angle from above
+    for (uint32_t x = 0; x < size.x; ++x) across.emplace_back(directionAt((x + 0.5) / size.x, 0.5));
     Moments moments;
     for (uint32_t y = 0; y < size.y; ++y) {
-        const double ring = std::cos(kPi * y / size.y) - std::cos(kPi * (y + 1.0) / size.y);
-        for (uint32_t x = 0; x < size.x; ++x)
-            moments.add(radiance[size_t{y} * size.x + x], directionAt((x + 0.5) / size.x, (y + 0.5) / size.y),
-                        ring * 2 * kPi / size.x);
+        // Sums over the row: of radiance, and of that times x, y, x x, x y and y y.
+        std::array<glm::dvec3, 6> sums{};
+        for (uint32_t x = 0; x < size.x; ++x) {
+            const glm::dvec3 light(radiance[size_t{y} * size.x + x]);
+            const glm::dvec2 a = across[x];
+            sums[0] += light, sums[1] += a.x * light, sums[2] += a.y * light;
+            sums[3] += a.x * a.x * light, sums[4] += a.x * a.y * light, sums[5] += a.y * a.y * light;
+        }
+        const double from = std::cos(kPi * y / size.y), to = std::cos(kPi * (y + 1.0) / size.y);
+        const double angle = kPi * (y + 0.5) / size.y, texel = (from - to) * 2 * kPi / size.x;
+        addRow(moments, sums, std::sin(angle), std::cos(angle), texel);
     }
     EnvironmentLight light = lightOf(moments);
     const double most = mostLight(light);

@@ -68,6 +68,7 @@ struct Shading {
     std::vector<DirectedLight> moreLights;  ///< beside it: at most kMostLights - 1
     /// Light from everywhere; absent: a pale sky above dark ground.
     std::optional<EnvironmentLight> environment;
+    bool lightsBeside = false;            ///< the lights are on beside the environment, too
     glm::vec3 clay{0.80f, 0.76f, 0.70f};  ///< linear
     glm::vec3 cap{0.62f, 0.23f, 0.16f};   ///< linear; colour of cut solids
     bool shadows = false;                 ///< hard shadows: a further ray a pixel and light
@@ -81,6 +82,9 @@ struct Shading {
 
     bool operator==(const Shading&) const = default;
 };
+
+/// Whether the lights are on: an environment stands for them.
+inline bool areLightsOn(const Shading& shading) { return !shading.environment || shading.lightsBeside; }
 
 /// Returns all lights, and sets them: at least one, at most kMostLights.
 inline std::vector<DirectedLight> lightsOf(const Shading& shading) {

@@ -141,7 +141,7 @@ bool hasLight(const Shading& shading) {
 
 bool castsShadows(const Shading& shading) {
     const std::vector<DirectedLight> lights = lightsOf(shading);
-    return shading.shadows &&
+    return shading.shadows && areLightsOn(shading) &&
            std::any_of(lights.begin(), lights.end(), [](const DirectedLight& light) { return light.strength > 0; });
 }
 
@@ -182,11 +182,12 @@ frame::FrameConstants frameConstants(const FrameRequest& request, const Dataset*
     c.stripes = stripes;
     c.shadingMode = shadingMode(request.shading.mode);
     const LightDirections directions = lightDirections(request, basis);
-    c.lightDirection = glm::vec4(glm::vec3(directions.light), request.shading.lightStrength);
+    const float on = areLightsOn(request.shading) ? 1.0f : 0.0f;
+    c.lightDirection = glm::vec4(glm::vec3(directions.light), on * request.shading.lightStrength);
     c.opacity = request.shading.opacity;
     c.lightCount = 1;
     for (const DirectedLight& light : request.shading.moreLights)
-        c.moreLights[c.lightCount++ - 1] = glm::vec4(glm::vec3(towardsLight(light, basis)), light.strength);
+        c.moreLights[c.lightCount++ - 1] = glm::vec4(glm::vec3(towardsLight(light, basis)), on * light.strength);
     c.upDirection = toVec4(directions.sky);
     c.clay = encoded(request.shading.clay);
     c.cap = encoded(request.shading.cap);
@@ -274,7 +275,7 @@ uint64_t numberOfRays(const FrameRequest& request) {
     if (!request.sections.empty()) add(request.sectionCaps);
     const Shading& shading = request.shading;
     if (!hasLight(shading)) return number;
-    add(shading.shadows), add(shading.occlusionRays), add(shading.occlusionRadius);
+    add(castsShadows(shading)), add(shading.occlusionRays), add(shading.occlusionRadius);
     add(shading.lightFollowsCamera), addPoint(shading.lightDirection);
     for (const DirectedLight& light : shading.moreLights) add(light.followsCamera), addPoint(light.direction);
     // What is hidden is in no ray's way.

@@ -71,8 +71,9 @@ void setPicture(frame::MesoView& view, glm::dvec3 origin, const FrameRequest& re
     const PictureTile whole = wholePicture(request);
     const CameraBasis basis = cameraBasis(request.camera, whole.fullWidth, whole.fullHeight);
     view.lightCount = 0;
+    const float on = areLightsOn(request.shading) ? 1.0f : 0.0f;
     for (const DirectedLight& light : lightsOf(request.shading))
-        view.lights[view.lightCount++] = glm::vec4(glm::vec3(towardsLight(light, basis)), light.strength);
+        view.lights[view.lightCount++] = glm::vec4(glm::vec3(towardsLight(light, basis)), on * light.strength);
     view.up = lightDirections(request, basis).sky;
     view.hasEnvironment = request.shading.environment ? 1 : 0;
     if (request.shading.environment) {

@@ -348,11 +348,14 @@ void Viewer::centreOn(glm::dvec2 pixel) {
 }
 
 void Viewer::turnLight(glm::dvec2 by) {
+    if (!areLightsOn(shading_)) {
+        shading_.environment->turn += float(glm::degrees(by.x));
+        return;
+    }
     const glm::dquat camera = shading_.lightFollowsCamera ? glm::dquat(1, 0, 0, 0) : camera_.orientation;
     const glm::dquat turn = glm::angleAxis(by.x, glm::dvec3(0, 1, 0)) * glm::angleAxis(by.y, glm::dvec3(1, 0, 0));
     const glm::dvec3 direction = camera * (turn * (glm::conjugate(camera) * glm::dvec3(shading_.lightDirection)));
     shading_.lightDirection = glm::vec3(glm::normalize(direction));
-    if (shading_.environment) shading_.environment->turn += float(glm::degrees(by.x));
 }
 
 void Viewer::advanceCamera(double now) {
@@ -397,6 +400,7 @@ void Viewer::moveSections(double steps) {
 }
 
 std::string Viewer::whyWithout(ViewerAction action) const {
+    if (action == ViewerAction::ToggleShadows && !areLightsOn(shading_)) return "surroundings alone cast no shadows";
     if (!isPaper_) return {};
     if (action == ViewerAction::ToggleShadows) return "files of the method paper are drawn without shadows";
     if (action == ViewerAction::ToggleOcclusion) return "files of the method paper are drawn without ambient occlusion";

@@ -826,6 +826,15 @@ static void scenes(void) {
     CHECK(isinf(depth[PIXELS / 2 + WIDTH / 2 - 4]) && isfinite(depth[PIXELS / 2 + WIDTH / 2 + 8]));
     read_frame(later, b, depth);
     CHECK(memcmp(a, b, sizeof(a)) == 0);
+    /* Surroundings come and go, and leave the scene's lights as they are. */
+    OK(vcp_view_set_environment(later, "studio", 30, 1));
+    OK(vcp_view_settle(later, 60));
+    read_frame(later, b, depth);
+    CHECK(memcmp(a, b, sizeof(a)) != 0);
+    OK(vcp_view_set_environment(later, NULL, 0, 0));
+    OK(vcp_view_settle(later, 60));
+    read_frame(later, b, depth);
+    CHECK(memcmp(a, b, sizeof(a)) == 0);
 
     vcp_context* by_calls = make_context(NULL);
     vcp_view* other = make_view(by_calls);

@@ -248,56 +248,61 @@ std::vector<std::string> channelsOf(const Imf::ChannelList& list) {
     return found.size() == 1 ? found : std::vector<std::string>{};
 }
 
-/// Reads a channel; throws what the library throws.
-Result<std::vector<float>> planeOf(Imf::InputFile& input, const std::string& name, glm::ivec2 size) {
-    const Imf::Channel& channel = *input.header().channels().findChannel(name);
-    if (channel.xSampling != 1 || channel.ySampling != 1)
-        return wrong(ErrorCode::Unsupported, fmt::format("its channel {} has fewer texels than the picture", name));
+/// Reads channels, all at once; throws what the library throws.
+Result<std::vector<std::vector<float>>> planesOf(Imf::InputFile& input, const std::vector<std::string>& names,
+                                                 glm::ivec2 size) {
     const Imath::Box2i window = input.header().dataWindow();
-    std::vector<float> plane(size_t(size.x) * size_t(size.y));
     const size_t texel = sizeof(float), row = texel * size_t(size.x);
+    std::vector<std::vector<float>> planes;
     Imf::FrameBuffer frame;
-    frame.insert(name, Imf::Slice::Make(Imf::FLOAT, plane.data(), window, texel, row));
+    for (const std::string& name : names) {
+        const Imf::Channel& channel = *input.header().channels().findChannel(name);
+        if (channel.xSampling != 1 || channel.ySampling != 1)
+            return wrong(ErrorCode::Unsupported, fmt::format("its channel {} has fewer texels than the picture", name));
+        std::vector<float>& plane = planes.emplace_back(size_t(size.x) * size_t(size.y));
+        frame.insert(name, Imf::Slice::Make(Imf::FLOAT, plane.data(), window, texel, row));
+    }
     input.setFrameBuffer(frame);
     input.readPixels(window.min.y, window.max.y);
-    for (size_t i = 0; i < plane.size(); ++i)
-        if (!std::isfinite(plane[i]))
-            return Error{.code = ErrorCode::InvalidInput,
-                         .message = "is no finite number",
-                         .element = fmt::format("texel {}, {}", i % size_t(size.x), i / size_t(size.x))};
-    return plane;
+    for (const std::vector<float>& plane : planes)
+        for (size_t i = 0; i < plane.size(); ++i)
+            if (!std::isfinite(plane[i]))
+                return Error{.code = ErrorCode::InvalidInput,
+                             .message = "is no finite number",
+                             .element = fmt::format("texel {}, {}", i % size_t(size.x), i / size_t(size.x))};
+    return planes;
 }
 
-/// Decodes the picture; throws what the library throws.
 Result<FloatPicture> meanOf(Imf::InputFile& input, glm::ivec2 size) {
     const auto channels = channelsOf(input.header().channels());
     if (channels.empty()) return wrong(ErrorCode::Unsupported, "has no channel Y, R, G or B, and not just one");
     FloatPicture picture{size, std::vector<float>(size_t(size.x) * size_t(size.y))};
-    for (const std::string& name : channels) {
-        VCP_TRY_ASSIGN(const auto plane, planeOf(input, name, size));
+    VCP_TRY_ASSIGN(const auto planes, planesOf(input, channels, size));
+    for (const std::vector<float>& plane : planes)
         for (size_t i = 0; i < plane.size(); ++i) picture.values[i] += plane[i] / float(channels.size());
-    }
     return picture;
 }
+
 Result<FloatColours> coloursOf(Imf::InputFile& input, glm::ivec2 size) {
-    FloatColours colours{size, {}};
     const Imf::ChannelList& list = input.header().channels();
-    for (size_t i = 0; i < 3; ++i) {
-        const std::string name(1, "RGB"[i]);
-        const bool isColoured = list.findChannel("R") && list.findChannel("G") && list.findChannel("B");
-        if (!isColoured && !list.findChannel("Y"))
-            return wrong(ErrorCode::Unsupported, "has no channels R, G and B, and no Y");
-        VCP_TRY_ASSIGN(colours.planes[i], planeOf(input, isColoured ? name : "Y", size));
-    }
-    return colours;
+    const bool isColoured = list.findChannel("R") && list.findChannel("G") && list.findChannel("B");
+    if (!isColoured && !list.findChannel("Y"))
+        return wrong(ErrorCode::Unsupported, "has no channels R, G and B, and no Y");
+    using Names = std::vector<std::string>;
+    VCP_TRY_ASSIGN(auto planes, planesOf(input, isColoured ? Names{"R", "G", "B"} : Names{"Y"}, size));
+    planes.resize(3, planes.front());
+    return FloatColours{size, {std::move(planes[0]), std::move(planes[1]), std::move(planes[2])}};
 }
 
+/// Decodes a picture, what is wanted of it by `pictureOf`, which may throw what the library throws.
 template <class Picture>
-Result<Picture> decoded(std::span<const std::byte> file, int mostEdge,
+Result<Picture> decoded(std::span<const std::byte> file, int mostEdge, uint64_t mostTexels,
                         Result<Picture> (*pictureOf)(Imf::InputFile& input, glm::ivec2 size)) {
     if (!isExr(file)) return wrong(ErrorCode::InvalidInput, "is not an EXR");
     HeaderWalk walk(file);
     VCP_TRY_ASSIGN(const auto size, walk.sizeOf(mostEdge));
+    if (uint64_t(size.x) * uint64_t(size.y) > mostTexels)
+        return wrong(ErrorCode::Limit, fmt::format("{} x {} texels; at most {} are read", size.x, size.y, mostTexels));
     try {
         MemoryStream stream(file, walk.header());
         Imf::InputFile input(stream, 0);
@@ -320,10 +325,10 @@ bool isExr(std::span<const std::byte> file) {
 bool readsExr() { return true; }
 
 Result<FloatPicture> decodeExr(std::span<const std::byte> file, int mostEdge) {
-    return decoded(file, mostEdge, meanOf);
+    return decoded(file, mostEdge, ~uint64_t{0}, meanOf);
 }
-Result<FloatColours> decodeExrColours(std::span<const std::byte> file, int mostEdge) {
-    return decoded(file, mostEdge, coloursOf);
+Result<FloatColours> decodeExrColours(std::span<const std::byte> file, int mostEdge, uint64_t mostTexels) {
+    return decoded(file, mostEdge, mostTexels, coloursOf);
 }
 
 #else
@@ -334,7 +339,7 @@ Result<FloatPicture> decodeExr(std::span<const std::byte>, int) {
     return wrong(ErrorCode::Unsupported,
                  "is an EXR picture, and this program was built without OpenEXR; save it as a PNG of 16 bits");
 }
-Result<FloatColours> decodeExrColours(std::span<const std::byte>, int) {
+Result<FloatColours> decodeExrColours(std::span<const std::byte>, int, uint64_t) {
     return wrong(ErrorCode::Unsupported,
                  "is an EXR picture, and this program was built without OpenEXR; save it as a .hdr");
 }

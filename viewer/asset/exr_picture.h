@@ -38,7 +38,8 @@ bool isExr(std::span<const std::byte> file);
 /// OpenEXR).
 Result<FloatPicture> decodeExr(std::span<const std::byte> file, int mostEdge);
 
-/// Does so with the channels R, G and B, or where one lacks, with Y for all of them.
-Result<FloatColours> decodeExrColours(std::span<const std::byte> file, int mostEdge);
+/// Does so with the channels R, G and B, or where one lacks, with Y for all of them. Errors: also Limit above
+/// `mostTexels`.
+Result<FloatColours> decodeExrColours(std::span<const std::byte> file, int mostEdge, uint64_t mostTexels);
 
 }  // namespace vcp

@@ -30,11 +30,10 @@ public:
         : left_(reinterpret_cast<const char*>(file.data()), file.size()) {}
 
     Result<RadiancePicture> read() {
-        bool isRgbe = true;
+        bool isXyz = false;
         for (std::string_view text = line(); !text.empty(); text = line())
-            if (text.starts_with("FORMAT=")) isRgbe = text == "FORMAT=32-bit_rle_rgbe";
-        if (!isRgbe)
-            return Error{.code = ErrorCode::Unsupported, .message = "a Radiance picture in XYZ; save it as RGB"};
+            if (text.starts_with("FORMAT=")) isXyz = text.find("xyze") != text.npos;
+        if (isXyz) return Error{.code = ErrorCode::Unsupported, .message = "a Radiance picture in XYZ; save it as RGB"};
         VCP_TRY(readSize(line()));
         for (uint32_t y = 0; y < picture_.size.y; ++y)
             if (!readRow())
@@ -52,7 +51,7 @@ private:
         const size_t end = std::min(left_.find('\n'), left_.size());
         const std::string_view text = left_.substr(0, end);
         left_.remove_prefix(std::min(end + 1, left_.size()));
-        return text;
+        return text.ends_with('\r') ? text.substr(0, end - 1) : text;
     }
 
     Result<void> readSize(std::string_view text) {
@@ -63,6 +62,10 @@ private:
             text.remove_prefix(size_t(end - text.data()));
             return failed == std::errc() && value > 0;
         };
+        if (text.starts_with("+Y ") || text.starts_with("+X ") || text.starts_with("-X ") ||
+            text.find(" -X ") != text.npos)
+            return Error{.code = ErrorCode::Unsupported,
+                         .message = "its first texel is not the upper left one; save it as \"-Y 1024 +X 2048\""};
         if (!number("-Y ", picture_.size.y) || !number(" +X ", picture_.size.x))
             return damaged("its size is not like \"-Y 1024 +X 2048\"");
         if (std::max(picture_.size.x, picture_.size.y) > kMostEdge ||
@@ -153,7 +156,7 @@ Result<RadiancePicture> decodeRadiance(std::span<const std::byte> file) {
     if (!isExr(file))
         return Error{.code = ErrorCode::InvalidInput,
                      .message = "is neither a Radiance picture (.hdr) nor an EXR of the surroundings"};
-    VCP_TRY_ASSIGN(const auto colours, decodeExrColours(file, int(kMostEdge)));
+    VCP_TRY_ASSIGN(const auto colours, decodeExrColours(file, int(kMostEdge), kMostTexels));
     RadiancePicture picture{glm::uvec2(colours.size), {}};
     picture.texels.reserve(colours.planes[0].size());
     for (size_t i = 0; i < colours.planes[0].size(); ++i)

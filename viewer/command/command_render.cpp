@@ -108,10 +108,11 @@ Result<void> checkOptions(const RenderCommand& command) {
 OutputRules rulesOf(const RenderCommand& command, const std::vector<std::filesystem::path>& filesRead) {
     OutputRules rules{.overwrite = command.overwrite, .inputs = filesRead};
     for (const std::string& name : command.inputs) rules.inputs.emplace_back(name);
-    for (const std::string& name :
-         {command.path, command.measurement, command.render.source.caFile, command.render.environment.source})
+    for (const std::string& name : {command.path, command.measurement, command.render.source.caFile})
         if (!name.empty()) rules.inputs.emplace_back(name);
     if (const auto* file = std::get_if<std::filesystem::path>(&command.render.camera)) rules.inputs.push_back(*file);
+    const EnvironmentChoice& environment = command.render.environment;
+    if (!environment.source.empty() && environment.isFile()) rules.inputs.emplace_back(environment.source);
     return rules;
 }
 

@@ -46,7 +46,8 @@ void addEnvironment(CLI::App& app, EnvironmentChoice& environment) {
                        fmt::format("Light from everywhere, in place of the light where none is asked for: {}, or a "
                                    "picture of the surroundings (.hdr, .exr; equirectangular)",
                                    fmt::join(kEnvironmentNames, ", ")))
-            ->type_name("NAME|FILE");
+            ->type_name("NAME|FILE")
+            ->check([](const std::string& text) { return text.empty() ? "must not be empty" : std::string(); });
     app.add_option("--environment-turn", environment.turn, "Degrees that the surroundings are turned to the left")
         ->type_name("DEGREES")
         ->needs(source)

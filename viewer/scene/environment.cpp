@@ -1,13 +1,16 @@
 #include "viewer/scene/environment.h"
 
+#include <algorithm>
+#include <filesystem>
+
 #include "viewer/asset/radiance_picture.h"
 
 namespace vcp {
 
 bool isEnvironmentName(const std::string& name) {
-    for (const char* end : {".hdr", ".exr", ".HDR", ".EXR"})
-        if (name.ends_with(end)) return true;
-    return false;
+    std::string end = std::filesystem::path(name).extension().string();
+    std::ranges::transform(end, end.begin(), [](char c) { return c >= 'A' && c <= 'Z' ? char(c - 'A' + 'a') : c; });
+    return end == ".hdr" || end == ".exr";
 }
 
 Result<EnvironmentLight> openEnvironment(const EnvironmentChoice& choice) {
@@ -28,10 +31,10 @@ Result<EnvironmentLight> openEnvironment(const EnvironmentChoice& choice) {
 bool hasOwnLight(const OpenedScene& scene) { return !scene.file.lights.empty() || scene.environment; }
 
 void setSceneLight(Shading& shading, const OpenedScene& scene, const Shading& usual) {
+    const bool hasLights = !scene.file.lights.empty();
+    setLights(shading, hasLights ? scene.file.lights : lightsOf(usual));
     shading.environment = scene.environment ? scene.environment : usual.environment;
-    if (!scene.file.lights.empty()) return setLights(shading, scene.file.lights);
-    setLights(shading, lightsOf(usual));
-    if (scene.environment) setLights(shading, {{usual.lightFollowsCamera, usual.lightDirection, 0}});
+    shading.lightsBeside = hasLights || (!scene.environment && usual.lightsBeside);
 }
 
 }  // namespace vcp

@@ -19,8 +19,8 @@ Result<EnvironmentLight> openEnvironment(const EnvironmentChoice& choice);
 /// Whether a scene has lights or surroundings of its own.
 bool hasOwnLight(const OpenedScene& scene);
 
-/// Sets the lights of a scene, and its surroundings; what it does not have is as in `usual`. Where it has surroundings
-/// and no lights, there is no light beside them.
+/// Sets the lights of a scene, and its surroundings; what it does not have is as in `usual`. Beside surroundings only a
+/// scene's own lights are on.
 void setSceneLight(Shading& shading, const OpenedScene& scene, const Shading& usual);
 
 }  // namespace vcp

@@ -40,7 +40,7 @@ RendererOptions RenderSettings::rendererOptions() const {
 Result<void> RenderSettings::takeEnvironment() {
     if (environment.source.empty()) return {};
     VCP_TRY_ASSIGN(shading.environment, openEnvironment(environment));
-    if (!hasLight) shading.lightStrength = 0;
+    shading.lightsBeside = hasLight;
     return {};
 }
 

@@ -363,13 +363,12 @@ private:
         if (!isObject(json, at)) return std::nullopt;
         onlyKeys(json, at, {"source", "turn_degrees", "strength"});
         EnvironmentChoice made;
-        const auto isPicture = [](const std::string& name) {
-            return std::ranges::find(kEnvironmentNames, name) == kEnvironmentNames.end();
-        };
+        const auto isPicture = [](const std::string& name) { return EnvironmentChoice{name}.isFile(); };
         if (json.contains("source"))
             made.source = named(json["source"], at + "/source", isPicture);
         else
             wrong(at, "\"source\" is missing");
+        if (isHttpUrl(made.source)) wrong(at + "/source", "must be a file on this machine, not an address");
         if (json.contains("turn_degrees")) made.turn = float(number(json["turn_degrees"], at + "/turn_degrees"));
         if (json.contains("strength"))
             made.strength = strength(json["strength"], at + "/strength", kStrongestEnvironment);
@@ -464,6 +463,10 @@ Result<Similarity> scenePlacement(std::span<const double, 16> rows) {
     return placement;
 }
 
+bool EnvironmentChoice::isFile() const {
+    return std::ranges::find(kEnvironmentNames, source) == kEnvironmentNames.end();
+}
+
 std::vector<DatasetLook> looksOf(const SceneFile& scene) {
     std::vector<DatasetLook> looks;
     for (size_t i = 0; i < scene.datasets.size(); ++i) {
@@ -481,7 +484,7 @@ std::vector<std::filesystem::path> filesOf(const SceneFile& scene) {
     for (const MesoSurfaceDescription& surface : scene.surfaces)
         for (const std::string& name : {surface.asset, surface.base, surface.colourTexture, surface.normalTexture})
             if (!name.empty()) files.emplace_back(name);
-    if (scene.environment) files.emplace_back(scene.environment->source);
+    if (scene.environment && scene.environment->isFile()) files.emplace_back(scene.environment->source);
     return files;
 }
 

@@ -33,6 +33,9 @@ struct EnvironmentChoice {
     float turn = 0;      ///< degrees, as EnvironmentLight
     float strength = 1;  ///< 0 to kStrongestEnvironment
 
+    /// Whether the source is a picture.
+    [[nodiscard]] bool isFile() const;
+
     bool operator==(const EnvironmentChoice&) const = default;
 };
 

@@ -401,7 +401,7 @@ export class VcpViewer extends HTMLElement {
                 const now = { x: event.offsetX, y: event.offsetY };
                 this.orbit.zoom(span(before) / span(now), ...halves((now.x + others[0].x) / 2, (now.y + others[0].y) / 2));
                 this.orbit.pan(dx / 2, dy / 2, this.clientHeight);
-            } else if (event.ctrlKey) {
+            } else if (event.ctrlKey && this.environment === 0) {
                 this.light.turn(dx, dy, this.clientHeight);
                 this.setAttribute('light', this.light.toText());
             } else if (event.buttons & 6 || event.shiftKey) this.orbit.pan(dx, dy, this.clientHeight);

@@ -354,7 +354,8 @@ void bindLook(py::class_<View>& view) {
             [](View& self, const std::optional<std::string>& source, float turn, float strength) {
                 self.setEnvironment(source ? source->c_str() : nullptr, turn, strength);
             },
-            "source"_a, "turn_degrees"_a = 0.0f, "strength"_a = 1.0f)
+            py::call_guard<py::gil_scoped_release>(), "source"_a, "turn_degrees"_a = 0.0f, "strength"_a = 1.0f,
+            "Lights the view by surroundings: studio, overcast, clear, or a picture (.hdr, .exr); None: by its lights.")
         .def("set_visible", &View::setVisible, "dataset"_a, "visible"_a)
         .def("is_visible", &View::isVisible, "dataset"_a)
         .def_property(

@@ -341,10 +341,11 @@ typedef struct vcp_look {
 VCP_API vcp_status vcp_view_get_look(vcp_view* view, vcp_look* look);
 VCP_API vcp_status vcp_view_set_look(vcp_view* view, const vcp_look* look);
 
-/* Lights the view from everywhere, in place of its light: "studio", "overcast", "clear", or a picture of the
- * surroundings, equirectangular (.hdr, .exr). They are turned to the left, and `strength` is 0 to 10 times the usual
- * light. NULL: the light is as before. What is opened next takes it away. Errors: VCP_USAGE, VCP_IO, VCP_INVALID_INPUT
- * (damaged, black), VCP_UNSUPPORTED, VCP_LIMIT (above 8192 x 4096); then nothing changes. */
+/* Lights the view from everywhere, in place of its lights, which stay as they are: "studio", "overcast", "clear", or a
+ * picture of the surroundings, equirectangular (.hdr, .exr), which takes up to some seconds to read. `turn_degrees`:
+ * the surroundings are turned about the axis that points up, to the left as seen from above; `strength`: 0 to 10 times
+ * their usual light. NULL: the view's lights light it again. What is opened next takes it away. Errors: VCP_USAGE,
+ * VCP_IO, VCP_INVALID_INPUT (damaged, black), VCP_UNSUPPORTED, VCP_LIMIT (above 8192 x 4096); then nothing changes. */
 VCP_API vcp_status vcp_view_set_environment(vcp_view* view, const char* source, float turn_degrees, float strength);
 
 /* Shows (1) or hides (0) a dataset in this view, by its number in the order in which they were placed. What is hidden

@@ -296,17 +296,13 @@ Result<void> checkLook(const vcp_look& look) {
 
 Result<void> setEnvironment(vcp_view& view, const char* source, float turn, float strength) {
     Shading shading = view.viewer->shading();
-    if (source == nullptr) {
-        shading.environment.reset();
-        shading.lightStrength = DirectedLight().strength;
-    } else {
+    shading.environment.reset();
+    if (source != nullptr) {
         if (!std::isfinite(turn)) return wrong("the turn is not finite");
         if (!(strength >= 0 && strength <= kStrongestEnvironment)) return wrong("the strength is not 0 to 10");
         VCP_TRY_ASSIGN(shading.environment, openEnvironment({source, turn, strength}));
-        shading.lightStrength = 0;
     }
     view.viewer->setShading(shading);
-    view.hasSceneLight = true;  // what is opened next takes it away, as the light of a scene
     return {};
 }
 
@@ -432,11 +428,10 @@ void vcp_view::showScene() {
     viewer->show(scene.placed(), scene.surfaces, scene.file.camera.value_or(camera), context->name);
     viewer->setLooks(looksOf(scene.file));
     // The lights and planes of one scene do not apply to the next.
-    if (std::exchange(hasSceneLight, hasOwnLight(scene)) || hasSceneLight) {
-        vcp::Shading shading = viewer->shading();
-        setSceneLight(shading, scene, vcp::Shading());
-        viewer->setShading(shading);
-    }
+    vcp::Shading shading = viewer->shading(), usual = vcp::Shading();
+    if (!std::exchange(hasSceneLight, !scene.file.lights.empty())) setLights(usual, lightsOf(shading));
+    setSceneLight(shading, scene, usual);
+    viewer->setShading(shading);
     if (std::exchange(hasSceneSections, !scene.file.sections.empty()) || hasSceneSections) {
         viewer->setSections(scene.file.sections);
         viewer->setSectionCaps(scene.file.sectionCaps);

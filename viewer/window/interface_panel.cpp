@@ -174,11 +174,9 @@ void Interface::layOutLight() {
         shading.mode = static_cast<ShadingMode>(mode);
     // On files that are drawn without shadows, the switch does nothing.
     ImGui::BeginDisabled(!viewer.whyWithout(ViewerAction::ToggleShadows).empty());
-    // Surroundings alone cast none.
-    const bool isLit = std::ranges::any_of(lightsOf(shading), [](const DirectedLight& l) { return l.strength > 0; });
-    ImGui::BeginDisabled(!isLit);
     switchRow(*look_, "Shadows", shading.shadows, {"Light is cast from one side", "S"});
     ImGui::EndDisabled();
+    ImGui::BeginDisabled(!viewer.whyWithout(ViewerAction::ToggleOcclusion).empty());
     bool occlusion = shading.occlusionRays > 0;
     if (switchRow(*look_, "Ambient occlusion", occlusion, {"Corners and folds are darker", "O"}))
         shading.occlusionRays = occlusion ? kUsualOcclusionRays : 0;
@@ -205,14 +203,19 @@ void Interface::layOutSurroundings() {
     static constexpr const char* kNames[] = {"No surroundings", "Studio", "Overcast sky", "Clear sky"};
     static_assert(std::size(kNames) == kEnvironmentNames.size() + 1);
     std::vector<const char*> names(std::begin(kNames), std::end(kNames));
-    const std::string source = session_->surroundings(), file = std::filesystem::path(source).filename().string();
-    const auto known = std::ranges::find(kEnvironmentNames, source);
-    int chosen = source.empty() ? 0 : int(known - kEnvironmentNames.begin()) + 1;
-    if (chosen == int(names.size())) names.push_back(file.c_str());
+    const EnvironmentChoice own{session_->surroundings()};
+    const std::string dropped = session_->surroundingsFile();
+    const std::string file = std::filesystem::path(dropped).filename().string();
+    if (!dropped.empty()) names.push_back(file.c_str());
+    int chosen = own.source.empty() ? 0 : int(names.size()) - 1;
+    if (!own.source.empty() && !own.isFile())
+        chosen = int(std::ranges::find(kEnvironmentNames, own.source) - kEnvironmentNames.begin()) + 1;
     const Tip tip{"Light from all around; drop a picture of surroundings (.hdr, .exr) onto the window for its light",
                   ""};
     if (comboRow(*look_, "##surroundings", names, chosen, tip))
-        session_->surround(chosen == 0 ? "" : kEnvironmentNames[size_t(chosen) - 1]);
+        session_->surround(chosen == 0                        ? ""
+                           : chosen == int(std::size(kNames)) ? dropped
+                                                              : kEnvironmentNames[size_t(chosen) - 1]);
     Shading shading = session_->viewer().shading();
     if (!shading.environment) return;
     // From -180 to 180.

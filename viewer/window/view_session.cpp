@@ -68,12 +68,8 @@ Result<std::unique_ptr<ViewSession>> ViewSession::create(const SessionOptions& o
 }
 
 ViewSession::ViewSession(const SessionOptions& options, std::unique_ptr<Viewer> viewer)
-    : options_(options),
-      user_(options.user),
-      viewer_(std::move(viewer)),
-      seenLooks_(looks()),
-      up_(options.render.up),
-      environment_(options.render.environment) {
+    : options_(options), user_(options.user), viewer_(std::move(viewer)), seenLooks_(looks()), up_(options.render.up) {
+    takeSurroundings(options.render.environment);
     note("");
     useThemesBackground();
 }
@@ -142,7 +138,7 @@ Result<void> ViewSession::show(OpenedScene open, const std::vector<std::string>&
         Shading shading = viewer_->shading();
         setSceneLight(shading, open, options_.render.shading);
         viewer_->setShading(shading);
-        environment_ = open.file.environment.value_or(options_.render.environment);
+        takeSurroundings(open.file.environment.value_or(options_.render.environment));
     }
     cancelSaving();
     compared_.reset();
@@ -357,19 +353,26 @@ void ViewSession::goToPoint(size_t index) {
 }
 
 void ViewSession::surround(const std::string& source) {
+    dismissProblem();
     Shading shading = viewer_->shading();
-    if (source.empty()) {
-        shading.environment.reset();
-        if (shading.lightStrength == 0) shading.lightStrength = DirectedLight().strength;
-    } else {
-        const EnvironmentChoice choice{source, shading.environment ? shading.environment->turn : 0.0f, 1};
+    const auto before = std::exchange(shading.environment, std::nullopt);
+    if (!source.empty()) {
+        // Others keep turn and strength.
+        const EnvironmentChoice choice{source, before ? before->turn : 0.0f, before ? before->strength : 1.0f};
         const auto light = openEnvironment(choice);
         if (!light) return say(light.error().line());
-        environment_ = choice;
         shading.environment = *light;
-        shading.lightStrength = 0;
+        takeSurroundings(choice);
     }
     viewer_->setShading(shading);
+    // What is opened next keeps them, where it has no light of its own.
+    options_.render.shading.environment = shading.environment;
+    options_.render.environment = {source};
+}
+
+void ViewSession::takeSurroundings(const EnvironmentChoice& choice) {
+    environment_ = choice.source;
+    if (!choice.source.empty() && choice.isFile()) environmentFile_ = choice.source;
 }
 
 void ViewSession::saveScene() {
@@ -377,9 +380,12 @@ void ViewSession::saveScene() {
     if (std::ranges::any_of(scene_.datasets, [](const SceneDataset& each) { return each.file.empty(); }))
         return note("several meshes are shown as one: build a .vcp of them, which a scene can name");
     SceneFile scene = scene_;
-    scene.lights = lightsOf(viewer_->shading());
-    if (const auto& light = viewer_->shading().environment)
-        scene.environment = EnvironmentChoice{environment_.source, light->turn, light->strength};
+    const Shading& shading = viewer_->shading();
+    scene.lights.clear();
+    if (areLightsOn(shading)) scene.lights = lightsOf(shading);
+    scene.environment.reset();
+    if (const auto& light = shading.environment)
+        scene.environment = EnvironmentChoice{environment_, light->turn, light->strength};
     scene.camera = viewer_->camera();
     scene.sections = viewer_->sections();
     scene.sectionCaps = viewer_->sectionCaps();

@@ -146,8 +146,10 @@ public:
     void surround(const std::string& source);
     /// Returns what the surroundings are; empty: there are none.
     [[nodiscard]] std::string surroundings() const {
-        return viewer_->shading().environment ? environment_.source : std::string();
+        return viewer_->shading().environment ? environment_ : std::string();
     }
+    /// Returns the last picture that was one of them; empty: none.
+    [[nodiscard]] const std::string& surroundingsFile() const { return environmentFile_; }
 
     /// Overlays of streaming; nothing is asked of the renderer for them while they are off.
     bool showsPages = false;
@@ -227,6 +229,7 @@ private:
     void annotate(glm::dvec3 position);
     void keepPoints();
     Result<void> show(OpenedScene open, const std::vector<std::string>& inputs);
+    void takeSurroundings(const EnvironmentChoice& choice);
     void takePicked();
     void endPick();
     void saveSequence(const PictureChoice& choice, const std::string& name, const std::vector<OrbitCamera>& cameras);
@@ -253,7 +256,7 @@ private:
     std::string shown_;             // rememberedName of what is shown; empty: nothing
     ShadingMode unwired_ = ShadingMode::Lit;  // the mode before the wireframe
     bool wasShown_ = false, showsFeedback_ = false, hasSceneLight_ = false;
-    EnvironmentChoice environment_;  // where the viewer's light from everywhere comes from
+    std::string environment_, environmentFile_;  // the last surroundings, and the last that were a picture
     std::string problem_, note_;
     double notedAt_;  // time of the update that saw the note first; not a number until then
     std::vector<Layer> layers_;

@@ -207,7 +207,6 @@ TEST_F(HostRendererTest, LightFromEverywhere) {
     for (const NamedCamera& named : test::cameras(kLow, kHigh)) {
         SCOPED_TRACE(named.name);
         FrameRequest request = requestOf(named.camera);
-        request.shading.lightStrength = 0;
         request.shading.environment = environmentNamed("studio");
         request.shading.environment->turn = 70;
         request.shading.occlusionRays = 2;

@@ -119,10 +119,12 @@ TEST(Radiance, LiesAreRefused) {
     refused("", ErrorCode::InvalidInput, "neither");
     refused(head(100000, 100000), ErrorCode::Limit, "8192 x 4096");
     refused(head(8192, 8192), ErrorCode::Limit, "8192 x 4096");
-    refused("#?RADIANCE\n\n+X 4 -Y 4\n", ErrorCode::InvalidInput, "size");
+    refused("#?RADIANCE\n\n+X 4 -Y 4\n", ErrorCode::Unsupported, "upper left");
     refused("#?RADIANCE\n\n-Y 0 +X 4\n", ErrorCode::InvalidInput, "size");
     refused("#?RADIANCE\n\n-Y 99999999999 +X 4\n", ErrorCode::InvalidInput, "size");
     refused("#?RADIANCE\nFORMAT=32-bit_rle_xyze\n\n-Y 1 +X 1\nabcd", ErrorCode::Unsupported, "XYZ");
+    refused("#?RADIANCE\n\n+Y 4 +X 4\n", ErrorCode::Unsupported, "upper left");
+    EXPECT_TRUE(decoded("#?RADIANCE\r\nFORMAT=32-bit_rle_rgbe\r\n\r\n-Y 1 +X 1\r\nabcd"));
     // A run beyond the row, of no texel, and a repeat of none before.
     const std::string planes = head(8, 1) + std::string("\2\2\0\10", 4);
     refused(planes + std::string("\211\1", 2), ErrorCode::InvalidInput, "row 1 of 1");

@@ -5,6 +5,8 @@
 #include <gtest/gtest.h>
 #include <glm/geometric.hpp>
 
+#include "render/frame_setup.h"
+
 namespace vcp {
 namespace {
 
@@ -60,6 +62,35 @@ TEST(RenderSettings, SectionsInPartsOfTheBoxCountFromItsLowerSide) {
     EXPECT_EQ(planes[0].normal, glm::dvec3(-1, 0, 0));
     EXPECT_DOUBLE_EQ(planes[0].offset, 0) << "kept is x < -1 + 25% of 4";
     EXPECT_DOUBLE_EQ(planes[1].offset, 0.5);
+}
+
+TEST(RenderSettings, AnEnvironmentStandsForTheLight) {
+    RenderSettings settings;
+    ASSERT_TRUE(settings.takeEnvironment());
+    EXPECT_FALSE(settings.shading.environment);
+    settings.environment = {"overcast", 20, 0.5f};
+    ASSERT_TRUE(settings.takeEnvironment());
+    ASSERT_TRUE(settings.shading.environment);
+    EXPECT_EQ(settings.shading.environment->turn, 20);
+    EXPECT_EQ(settings.shading.environment->strength, 0.5f);
+    settings.shading.shadows = true;
+    EXPECT_FALSE(areLightsOn(settings.shading) || castsShadows(settings.shading));
+    settings.hasLight = true;
+    ASSERT_TRUE(settings.takeEnvironment());
+    EXPECT_TRUE(areLightsOn(settings.shading) && castsShadows(settings.shading));
+    settings.environment.source = "nowhere.exr";
+    EXPECT_EQ(settings.takeEnvironment().error().file, "nowhere.exr");
+}
+
+TEST(RenderSettings, RaysAreOthersWhereTheLightGoes) {
+    FrameRequest request;
+    request.shading.shadows = true;
+    request.shading.occlusionRays = 4;
+    const SelectionView lit = selectionView(request);
+    request.shading.environment = environmentNamed("clear");
+    EXPECT_NE(selectionView(request), lit);
+    request.shading.lightsBeside = true;
+    EXPECT_EQ(selectionView(request), lit);
 }
 
 }  // namespace

@@ -496,6 +496,52 @@ TEST_F(ViewSessionTest, ASceneIsSavedAndOpenedAgain) {
     EXPECT_LT(glm::distance(session_->viewer().camera().position, camera.position), 1e-9);
 }
 
+TEST_F(ViewSessionTest, SurroundingsComeAndGo) {
+    Shading lit = session_->viewer().shading();
+    setLights(lit, {{false, {0, 1, 0}, 0.3f}, {true, {1, 0, 0}, 0.5f}});
+    session_->viewer().setShading(lit);
+    session_->surround("studio");
+    Shading shading = session_->viewer().shading();
+    ASSERT_TRUE(shading.environment) << session_->problem();
+    EXPECT_FALSE(areLightsOn(shading));
+    EXPECT_FALSE(session_->viewer().whyWithout(ViewerAction::ToggleShadows).empty());
+    shading.environment->turn = 40, shading.environment->strength = 2;
+    session_->viewer().setShading(shading);
+    // Others are turned and as strong as these were.
+    session_->surround("clear");
+    EXPECT_EQ(session_->surroundings(), "clear");
+    EXPECT_EQ(session_->viewer().shading().environment->turn, 40);
+    EXPECT_EQ(session_->viewer().shading().environment->strength, 2);
+    session_->saveScene();
+    ASSERT_TRUE(session_->problem().empty()) << session_->problem();
+    session_->surround("nowhere.hdr");
+    EXPECT_NE(session_->problem().find("nowhere.hdr"), std::string::npos);
+    EXPECT_EQ(session_->surroundings(), "clear");
+    // Without them all is as it was.
+    session_->surround("");
+    EXPECT_EQ(session_->viewer().shading(), lit);
+    session_->saveScene();
+    const auto reopened = [&](const char* scene) {
+        session_->open({scene});
+        EXPECT_TRUE(turnUntil([&] { return !session_->opening(); }));
+        EXPECT_TRUE(session_->problem().empty()) << session_->problem();
+        return session_->viewer().shading();
+    };
+    shading = reopened("scene-1.json");
+    ASSERT_TRUE(shading.environment);
+    EXPECT_EQ(session_->surroundings(), "clear");
+    EXPECT_EQ(shading.environment->turn, 40);
+    EXPECT_FALSE(areLightsOn(shading));
+    // A scene with surroundings that are switched off is saved without.
+    session_->surround("");
+    session_->saveScene();
+    EXPECT_FALSE(reopened("scene-3.json").environment);
+    shading = reopened("scene-2.json");
+    EXPECT_FALSE(shading.environment);
+    EXPECT_EQ(lightsOf(shading).size(), 2u);
+    EXPECT_EQ(lightsOf(shading)[0].strength, 0.3f);
+}
+
 // In two tiles across and several rows of them, and in each picture of a turntable where the camera has it.
 TEST_F(ViewSessionTest, WhatIsMeasuredIsWrittenOverWhatIsSaved) {
     constexpr PictureChoice kPlain{.size = {600, 1100}}, kAnnotated{.size = {600, 1100}, .annotated = true};

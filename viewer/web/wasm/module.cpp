@@ -222,13 +222,11 @@ EXPORT(vcp_info) const double* vcp_info() {
 void setEnvironment(Shading& shading, size_t number, glm::vec3 up) {
     static std::array<std::optional<EnvironmentLight>, kEnvironmentNames.size()> lights;
     shading.environment.reset();
-    shading.lightStrength = DirectedLight().strength;
     if (number == 0 || number > lights.size()) return;
     auto& light = lights[number - 1];
     if (!light) light = environmentNamed(kEnvironmentNames[number - 1]);
     shading.environment = light;
     shading.environment->up = up;
-    shading.lightStrength = 0;
 }
 
 /// Sets what is to be drawn: eye, forward, up (three numbers each), vertical field of view, width, height, error in
