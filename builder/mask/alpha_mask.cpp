@@ -50,23 +50,54 @@ std::pair<uint32_t, uint32_t> covered(uint32_t at, uint32_t coarse, uint32_t fin
     return {uint32_t(uint64_t{at} * fine / coarse), uint32_t((uint64_t{at + 1} * fine + coarse - 1) / coarse)};
 }
 
-/// Returns an image of half the edges, whose texels are means.
-ByteImage halved(const ByteImage& fine) {
-    ByteImage coarse{std::max(fine.width / 2, 1u), std::max(fine.height / 2, 1u), {}};
-    coarse.values.reserve(size_t{coarse.width} * coarse.height);
-    for (uint32_t y = 0; y < coarse.height; ++y) {
-        const auto rows = covered(y, coarse.height, fine.height);
-        for (uint32_t x = 0; x < coarse.width; ++x) {
-            const auto columns = covered(x, coarse.width, fine.width);
-            uint32_t sum = 0;
-            for (uint32_t j = rows.first; j < rows.second; ++j)
-                for (uint32_t i = columns.first; i < columns.second; ++i)
-                    sum += fine.values[size_t{j} * fine.width + i];
-            const uint32_t count = (rows.second - rows.first) * (columns.second - columns.first);
-            coarse.values.push_back(uint8_t((sum + count / 2) / count));
+/// A channel of a coarser image, made while rows come: each texel is a mean of those that it covers.
+class ChannelRows {
+public:
+    ChannelRows(glm::uvec2 fine, glm::uvec2 coarse) : fine_(fine), coarse_{coarse.x, coarse.y, {}} {
+        coarse_.values.reserve(size_t{coarse.x} * coarse.y);
+    }
+
+    /// Takes the next row.
+    void add(std::span<const uint8_t> row) {
+        most_ = std::max(most_, *std::max_element(row.begin(), row.end()));
+        rows_.insert(rows_.end(), row.begin(), row.end());
+        const auto made = uint32_t(coarse_.values.size() / coarse_.width);
+        const auto [first, end] = covered(made, coarse_.height, fine_.y);
+        if (++count_ < end) return;
+        addMeans(end - first);
+        // The next may cover this one's last row, too.
+        if (made + 1 < coarse_.height)
+            rows_.erase(rows_.begin(),
+                        rows_.end() - ptrdiff_t(end - covered(made + 1, coarse_.height, fine_.y).first) * fine_.x);
+    }
+    [[nodiscard]] uint8_t most() const { return most_; }
+    ByteImage take() { return std::move(coarse_); }
+
+private:
+    void addMeans(uint32_t rows) {
+        for (uint32_t x = 0; x < coarse_.width; ++x) {
+            const auto columns = covered(x, coarse_.width, fine_.x);
+            uint64_t sum = 0;
+            for (uint32_t j = 0; j < rows; ++j)
+                for (uint32_t i = columns.first; i < columns.second; ++i) sum += rows_[size_t{j} * fine_.x + i];
+            const uint64_t count = uint64_t{columns.second - columns.first} * rows;
+            coarse_.values.push_back(uint8_t((sum + count / 2) / count));
         }
     }
-    return coarse;
+
+    glm::uvec2 fine_;
+    ByteImage coarse_;
+    std::vector<uint8_t> rows_;  // the last that were read, and that are not done with
+    uint32_t count_ = 0;         // of the rows read
+    uint8_t most_ = 0;
+};
+
+/// Returns an image of half the edges, whose texels are means.
+ByteImage halved(const ByteImage& fine) {
+    ChannelRows coarse({fine.width, fine.height}, {std::max(fine.width / 2, 1u), std::max(fine.height / 2, 1u)});
+    const std::span<const uint8_t> values(fine.values);
+    for (uint32_t y = 0; y < fine.height; ++y) coarse.add(values.subspan(size_t{y} * fine.width, fine.width));
+    return coarse.take();
 }
 
 bool mayBeHalved(glm::uvec2 size) { return std::min(size.x, size.y) >= 2 * kLeastEdge; }
@@ -154,48 +185,6 @@ constexpr uint64_t kMostTexels = uint64_t{4096} * 4096;
 uint8_t greyOf(Rgba8 c) {
     return uint8_t((299 * (c & 255u) + 587 * (c >> 8 & 255u) + 114 * (c >> 16 & 255u) + 500) / 1000);
 }
-
-/// A channel of an image, made while its rows are read: each texel is a mean of those that it covers.
-class ChannelRows {
-public:
-    ChannelRows(glm::uvec2 fine, glm::uvec2 coarse) : fine_(fine), coarse_{coarse.x, coarse.y, {}} {
-        coarse_.values.reserve(size_t{coarse.x} * coarse.y);
-    }
-
-    /// Takes the next row.
-    void add(std::span<const uint8_t> row) {
-        most_ = std::max(most_, *std::max_element(row.begin(), row.end()));
-        rows_.insert(rows_.end(), row.begin(), row.end());
-        const auto made = uint32_t(coarse_.values.size() / coarse_.width);
-        const auto [first, end] = covered(made, coarse_.height, fine_.y);
-        if (++count_ < end) return;
-        addMeans(end - first);
-        // The next may cover this one's last row, too.
-        if (made + 1 < coarse_.height)
-            rows_.erase(rows_.begin(),
-                        rows_.end() - ptrdiff_t(end - covered(made + 1, coarse_.height, fine_.y).first) * fine_.x);
-    }
-    [[nodiscard]] uint8_t most() const { return most_; }
-    ByteImage take() { return std::move(coarse_); }
-
-private:
-    void addMeans(uint32_t rows) {
-        for (uint32_t x = 0; x < coarse_.width; ++x) {
-            const auto columns = covered(x, coarse_.width, fine_.x);
-            uint64_t sum = 0;
-            for (uint32_t j = 0; j < rows; ++j)
-                for (uint32_t i = columns.first; i < columns.second; ++i) sum += rows_[size_t{j} * fine_.x + i];
-            const uint64_t count = uint64_t{columns.second - columns.first} * rows;
-            coarse_.values.push_back(uint8_t((sum + count / 2) / count));
-        }
-    }
-
-    glm::uvec2 fine_;
-    ByteImage coarse_;
-    std::vector<uint8_t> rows_;  // the last that were read, and that are not done with
-    uint32_t count_ = 0;         // of the rows read
-    uint8_t most_ = 0;
-};
 
 }  // namespace
 

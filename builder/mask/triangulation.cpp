@@ -40,11 +40,6 @@ Weights weightsAt(const GLdouble (&at)[3]) {
     return {{Weights::kOne - first - second, first, second}};
 }
 
-bool hasArea(const Weights& a, const Weights& b, const Weights& c) {
-    const auto along = [](const Weights& p, const Weights& q, int k) { return int64_t{q.of[k]} - p.of[k]; };
-    return along(a, b, 1) * along(a, c, 2) > along(a, b, 2) * along(a, c, 1);
-}
-
 extern "C" {
 void vcpTessellationVertex(void* vertex, void* user) {
     auto& all = *static_cast<Tessellation*>(user);
@@ -52,7 +47,7 @@ void vcpTessellationVertex(void* vertex, void* user) {
     if (all.count < 3) return;
     all.count = 0;
     const auto& [a, b, c] = all.corners;
-    if (hasArea(all.parts.points[a], all.parts.points[b], all.parts.points[c]))
+    if (turnOf(all.parts.points[a], all.parts.points[b], all.parts.points[c]) > 0)
         all.parts.triangles.push_back(all.corners);
 }
 // That it is there makes the tessellator hand out triangles alone, and no fans and strips.

@@ -1,7 +1,7 @@
 #include "builder/texture/image.h"
 
 #include <algorithm>
-#include <array>
+#include <string>
 
 #include <fmt/format.h>
 
@@ -27,13 +27,24 @@ Result<Image> readWhole(ImageRows& rows, const ImageLimits& limits) {
     return image;
 }
 
+Result<std::unique_ptr<RandomBytes>> bytesOf(const ImageSource& source) {
+    if (source.bytes) return randomBytesAt(*source.bytes);
+    return openRandomBytes(source.path);
+}
+
+/// Returns the first bytes of a file, with zeros behind its end.
+Result<std::string> beginningOf(RandomBytes& file) {
+    std::string begin(4, '\0');
+    VCP_TRY(file.read(0, begin.data(), size_t(std::min<uint64_t>(begin.size(), file.size()))));
+    return begin;
+}
+constexpr std::string_view kPngBegins = "\x89PNG";
+
 }  // namespace
 
 Result<std::unique_ptr<ImageRows>> ImageRows::open(std::unique_ptr<RandomBytes> file, const ImageLimits& limits) {
-    std::array<char, 4> first{};
-    VCP_TRY(file->read(0, first.data(), size_t(std::min<uint64_t>(first.size(), file->size()))));
-    const std::string_view begin(first.data(), first.size());
-    const bool isPng = begin == "\x89PNG";
+    VCP_TRY_ASSIGN(const auto begin, beginningOf(*file));
+    const bool isPng = begin == kPngBegins;
     if (!isPng && !begin.starts_with("\xFF\xD8"))
         return Error{.code = ErrorCode::Unsupported, .message = "the picture is neither PNG nor JPEG"};
     VCP_TRY_ASSIGN(auto rows, isPng ? openPng(std::move(file)) : openJpeg(std::move(file)));
@@ -48,12 +59,7 @@ Error namedImageError(const ImageSource& source, Error error) {
 }
 
 Result<std::unique_ptr<ImageRows>> openImage(const ImageSource& source, const ImageLimits& limits) {
-    std::unique_ptr<RandomBytes> file;
-    if (source.bytes) {
-        file = randomBytesAt(*source.bytes);
-    } else {
-        VCP_TRY_ASSIGN(file, openRandomBytes(source.path));
-    }
+    VCP_TRY_ASSIGN(auto file, bytesOf(source));
     if (file->size() > limits.fileBytes)
         return namedImageError(source,
                                {.code = ErrorCode::Limit,
@@ -145,11 +151,9 @@ private:
 };
 
 bool isPng(const ImageSource& source) {
-    char start[4] = {};
-    Result<std::unique_ptr<RandomBytes>> file =
-        source.bytes ? Result(randomBytesAt(*source.bytes)) : openRandomBytes(source.path);
-    return file && (*file)->size() >= sizeof start && (*file)->read(0, start, sizeof start) &&
-           std::string_view(start, sizeof start) == "\x89PNG";
+    const auto file = bytesOf(source);
+    const auto begin = file ? beginningOf(**file) : Result<std::string>(file.error());
+    return begin && *begin == kPngBegins;
 }
 
 /// Whether a mask that is an image of its own says what of a material's image is there, texel by texel.
@@ -182,8 +186,7 @@ Result<std::unique_ptr<ImageRows>> openImage(const Material& material, const Ima
 }
 
 bool mayBeTransparent(const ImageSource& source) {
-    if (source.bytes) return mayHaveAlpha(*randomBytesAt(*source.bytes));
-    const auto file = openRandomBytes(source.path);
+    const auto file = bytesOf(source);
     return file && mayHaveAlpha(**file);
 }
 

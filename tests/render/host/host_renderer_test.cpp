@@ -13,7 +13,6 @@ using test::channelsApart;
 using test::Difference;
 using test::drawnBy;
 using test::expectFew;
-using test::HostRendererTest;
 using test::kHigh;
 using test::kLow;
 using test::NamedCamera;
@@ -21,6 +20,25 @@ using test::Planes;
 using test::requestOf;
 using test::Scene;
 using test::torusAndBox;
+
+class HostRendererTest : public test::HostRendererTest {
+protected:
+    /// Compares pictures of two bodies from everywhere. `light`: sets how they are lit.
+    template <class Light>
+    Difference differenceOfAll(Light light, uint32_t samples = 1) {
+        const test::BuiltMesh built = torusAndBox();
+        EXPECT_TRUE(built.ok());
+        open(built);
+        Difference all;
+        for (const NamedCamera& named : test::cameras(kLow, kHigh)) {
+            SCOPED_TRACE(named.name);
+            FrameRequest request = requestOf(named.camera);
+            light(request.shading);
+            all += difference(request, built.cache().dataset().header.cell, samples);
+        }
+        return all;
+    }
+};
 
 constexpr ShadingMode kModes[] = {ShadingMode::Lit,     ShadingMode::Clay,  ShadingMode::Unlit,
                                   ShadingMode::Normals, ShadingMode::Level, ShadingMode::Error};
@@ -200,35 +218,22 @@ TEST_F(HostRendererTest, ShadowsAndOcclusion) {
 }
 
 TEST_F(HostRendererTest, LightFromEverywhere) {
-    const test::BuiltMesh built = torusAndBox();
-    ASSERT_TRUE(built.ok());
-    open(built);
-    Difference all;
-    for (const NamedCamera& named : test::cameras(kLow, kHigh)) {
-        SCOPED_TRACE(named.name);
-        FrameRequest request = requestOf(named.camera);
-        request.shading.environment = environmentNamed("studio");
-        request.shading.environment->turn = 70;
-        request.shading.occlusionRays = 2;
-        all += difference(request, built.cache().dataset().header.cell);
-    }
-    expectFew(all);
+    expectFew(differenceOfAll([](Shading& shading) {
+        shading.environment = environmentNamed("studio");
+        shading.environment->turn = 70;
+        shading.occlusionRays = 2;
+    }));
 }
 
 TEST_F(HostRendererTest, SixteenSamples) {
-    const test::BuiltMesh built = torusAndBox();
-    ASSERT_TRUE(built.ok());
-    open(built);
-    Difference all;
-    for (const NamedCamera& named : test::cameras(kLow, kHigh)) {
-        SCOPED_TRACE(named.name);
-        FrameRequest request = requestOf(named.camera);
-        request.shading.shadows = true;
-        request.shading.occlusionRays = 1;
-        request.shading.transparent = true;
-        all += difference(request, built.cache().dataset().header.cell, 16);
-    }
-    expectFew(all, 16);
+    expectFew(differenceOfAll(
+                  [](Shading& shading) {
+                      shading.shadows = true;
+                      shading.occlusionRays = 1;
+                      shading.transparent = true;
+                  },
+                  16),
+              16);
 }
 
 // Nothing stands between a convex body and its light: not the body itself either.
