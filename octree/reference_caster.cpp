@@ -292,12 +292,16 @@ Result<PageCache> PageCache::fromPages(Dataset dataset, std::vector<PageBytes> p
 
 Result<PageCache> PageCache::open(const std::filesystem::path& path) {
     VCP_TRY_ASSIGN(auto reader, openFile(path));
+    return open(std::shared_ptr<const ByteReader>(std::move(reader)));
+}
+
+Result<PageCache> PageCache::open(std::shared_ptr<const ByteReader> reader) {
     VCP_TRY_ASSIGN(auto dataset, readDataset(*reader));
     if (dataset.header.method != Method::Certified)
         return Error{.code = ErrorCode::Unsupported,
                      .message = "was built by the paper's method and has no certified surface; build it by the other",
-                     .file = path.string()};
-    return PageCache(reader, std::move(dataset));
+                     .file = reader->name()};
+    return PageCache(std::move(reader), std::move(dataset));
 }
 
 void PageCache::keep(uint64_t page, std::unique_ptr<const Loaded> loaded) {

@@ -34,6 +34,8 @@ public:
     /// Opens a .vcp file without loading a page. Errors: what openFile and readDataset say; Unsupported where the file
     /// is not of the certified method.
     static Result<PageCache> open(const std::filesystem::path& path);
+    /// Does so with a file that is open.
+    static Result<PageCache> open(std::shared_ptr<const ByteReader> reader);
 
     /// Loads a page unless it is loaded. Errors: what readPage says; Usage for a page that does not exist.
     Result<void> load(uint64_t page);

@@ -97,6 +97,14 @@ std::string addressWithoutUser(std::string_view address) {
     return isHttpUrl(address) ? withUserReplaced(address, "") : std::string(address);
 }
 
+std::string addressBeside(const std::string& address, const std::string& name) {
+    const size_t end = std::min(address.find_first_of("?#"), address.size());
+    // A host without a path has one slash less.
+    const size_t path = address.find('/', address.find("://") + 3);
+    if (path >= end) return address.substr(0, end) + "/" + name + address.substr(end);
+    return address.substr(0, address.rfind('/', end - 1) + 1) + name + address.substr(end);
+}
+
 std::optional<WebAddress> parseAddress(const std::string& text) {
     const Url url(curl_url());
     if (!isHttpUrl(text) || !url || curl_url_set(url.get(), CURLUPART_URL, text.c_str(), CURLU_URLENCODE) != CURLUE_OK)

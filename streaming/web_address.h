@@ -17,6 +17,9 @@ std::string shownAddress(std::string_view text);
 /// Returns an address without its user and password; any other text as it is.
 std::string addressWithoutUser(std::string_view address);
 
+/// Returns the address of a file beside another: in its folder, with the same query. `name`: plain letters.
+std::string addressBeside(const std::string& address, const std::string& name);
+
 /// The target of a request.
 struct WebAddress {
     std::string url;     ///< the address without user and password

@@ -35,8 +35,7 @@ Result<void> checkReplaceable(const fs::path& folder, const FolderRules& rules) 
     for (const fs::directory_entry& entry : entries) {
         const std::string name = entry.path().filename().string();
         if (!rules.overwrite) return refuse("is there already and not empty; " + rules.howToReplace);
-        const bool isOurs = std::find(rules.names.begin(), rules.names.end(), name) != rules.names.end();
-        if (!isOurs || !entry.is_regular_file(failed))
+        if (!rules.isOurs(name) || !entry.is_regular_file(failed))
             return refuse(fmt::format("holds {}, which is not of {}; choose another folder", name, rules.ofWhat));
         for (const fs::path& input : rules.inputs)
             if (isSameFile(entry.path(), input))

@@ -6,7 +6,7 @@
 #pragma once
 
 #include <filesystem>
-#include <span>
+#include <functional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -16,8 +16,8 @@
 namespace vcp {
 
 struct FolderRules {
-    std::span<const std::string_view> names;  ///< of files that such a folder may hold; must outlive what is done
-    std::string ofWhat;                       ///< "a published scan": for errors
+    std::function<bool(std::string_view)> isOurs;  ///< whether such a folder may hold a file of this name
+    std::string ofWhat;                            ///< "a published scan": for errors
     bool overwrite = false;
     std::string howToReplace;                        ///< "--overwrite replaces it": for errors
     std::vector<std::filesystem::path> inputs = {};  ///< files that the caller reads

@@ -12,6 +12,7 @@ const std::vector<Room>& rooms() {
         {"octree/image", {"octree/shared", "octree/io", "octree/surface"}},
         {"octree/page", {"octree/shared", "octree/io", "octree/surface"}},
         {"octree", {"octree/shared", "octree/io", "octree/surface", "octree/image", "octree/page"}},
+        {"octree/shard", {"octree", "octree/io", "octree/surface", "octree/image", "octree/page"}},
 
         {"builder/stream", {"octree/"}},
         {"builder/texture", {"octree/", "builder/stream"}},

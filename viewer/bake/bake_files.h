@@ -11,6 +11,7 @@
 //   mask.png           green: a height field; red: no hit; orange: several sheets; blue: steep; black: in no triangle
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <string_view>
 
@@ -23,6 +24,10 @@ namespace vcp {
 
 inline constexpr std::array<std::string_view, 8> kBakedFiles{
     "scene.json", "base.obj", "heights.meso", "base.glb", "displacement.png", "normal.png", "colour.png", "mask.png"};
+
+inline bool isBakedName(std::string_view name) {
+    return std::find(kBakedFiles.begin(), kBakedFiles.end(), name) != kBakedFiles.end();
+}
 
 /// Writes all files into `folder`, under their names. `name`: what the asset is called. Returns their bytes. Errors:
 /// those of OutputFile.

@@ -104,8 +104,8 @@ void addColourChoice(CLI::App& app, BuildOptions& options) {
 void addImages(CLI::App& app, BuildOptions& options) {
     app.add_flag_function(
         "--images,!--no-images", [&options](int64_t times) { options.keepImages = times > 0; },
-        "Keep the images of materials, too, as sharp as they are, with their place on the triangles; browsers "
-        "do not draw from them yet [on, but with --error]");
+        "Keep the images of materials, too, as sharp as they are, with their place on the triangles [on, but "
+        "with --error]");
     addParsed(
         app, "--colour-quality,--color-quality", options.imageQuality, imageQualityNamed,
         "source, lossless or 1 to 100",

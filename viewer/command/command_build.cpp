@@ -6,10 +6,12 @@
 #include "builder/build.h"
 #include "builder/estimate.h"
 #include "builder/paper/paper_file.h"
+#include "octree/io/durable_file.h"
 #include "viewer/command/build_arguments.h"
 #include "viewer/command/commands.h"
 #include "viewer/command/manual/help_text.h"
 #include "viewer/command/paper_arguments.h"
+#include "viewer/command/shard_arguments.h"
 #include "viewer/command/terminal/interrupt.h"
 #include "viewer/scene/option_values.h"
 
@@ -23,6 +25,7 @@ struct BuildCommand {
     bool resume = false;
     bool dryRun = false;
     bool overwrite = false;
+    uint64_t shardBytes = 0;  ///< 0: one file
     double checkpointSeconds = BuildOptions().checkpointSeconds;
     std::string method = "certified";
     PaperOptions paper;
@@ -115,9 +118,35 @@ Result<void> checkMethod(const BuildCommand& command) {
     if (!command.isPaper()) return {};
     if (s.error > 0 || s.colour == ColourChoice::Vertex || s.colour == ColourChoice::Texture)
         return usage("--method paper has neither a tolerance (--error) nor colour");
+    if (command.shardBytes > 0) return usage("--method paper makes one page, which is not cut into shards");
     if (s.memoryBytes > 0 || !s.temp.empty() || command.resume || command.dryRun)
         return usage("--method paper builds in memory: without --memory, --temp, --resume and --dry-run");
     return {};
+}
+
+/// Returns where the one file is built that is cut into shards then.
+std::string wholeFileOf(const std::string& folder) {
+    const std::filesystem::path named(folder);
+    return (named.has_filename() ? named : named.parent_path()).string() + ".whole.vcp";
+}
+
+/// Cuts what was built into shards, and removes it. Where that fails it stays, and the error says how to go on.
+Result<ShardReport> cutIntoShards(const BuildCommand& command, const BuildOptions& options) {
+    auto report = [&]() -> Result<ShardReport> {
+        VCP_TRY_ASSIGN(const auto whole, openFile(options.output));
+        return shardWithProgress(*whole, command.output, command.shardBytes, options.inputs,
+                                 command.report.progressStyle());
+    }();
+    if (!report) {
+        Error error = report.error();
+        error.message += fmt::format("; the mesh is built: `vcp shard {} -o {}` goes on from there",
+                                     options.output.string(), command.output);
+        return error;
+    }
+    std::error_code failed;
+    if (!std::filesystem::remove(options.output, failed))
+        return systemError(options.output, "cannot be removed", failed.value());
+    return report;
 }
 
 Result<int> run(const BuildCommand& command) {
@@ -126,7 +155,9 @@ Result<int> run(const BuildCommand& command) {
     options.inputs.assign(command.inputs.begin(), command.inputs.end());
     if (command.output.empty() && !command.dryRun)
         return Error{.code = ErrorCode::Usage, .message = "--output is required; only --dry-run does without"};
-    options.output = command.output.empty() ? "." : command.output;
+    const std::string folder = command.shardBytes > 0 ? command.output : std::string();
+    options.output = command.output.empty() ? "." : folder.empty() ? command.output : wholeFileOf(folder);
+    if (!folder.empty() && !command.dryRun) VCP_TRY(checkShardFolder({.folder = folder, .inputs = options.inputs}));
     options.resume = command.resume;
     options.overwrite = command.overwrite;
     options.checkpointSeconds = command.checkpointSeconds;
@@ -140,13 +171,18 @@ Result<int> run(const BuildCommand& command) {
     const auto report = command.isPaper() ? buildPaperFile(options, command.paper) : buildOctree(options);
     display.finish();
     if (!report) return report.error();
+    std::optional<ShardReport> shards;
+    if (!folder.empty()) {
+        VCP_TRY_ASSIGN(shards, cutIntoShards(command, options));
+    }
     if (command.report.json) {
         Json json = toJson(*report);
+        if (shards) json.update(toJson(*shards));
         json["cut_triangles"] = report->cutTriangles;
         json["warnings"] = report->warnings;
         VCP_TRY(printJson(json));
     } else {
-        VCP_TRY(printLine(summary(command.output, *report)));
+        VCP_TRY(printLine(summary(command.output, *report) + (shards ? "\n  " + summary(*shards) : "")));
     }
     return 0;
 }
@@ -161,6 +197,7 @@ Command addBuild(CLI::App& vcp) {
                    "stands for those in it, - for standard input");
     beginGroup(*app, help_group::kOutput);
     addBuildOutput(*app, command->output);
+    addShardBytes(*app, "--shards", command->shardBytes);
     addOverwriteOption(*app, command->overwrite);
     app->add_flag("--resume", command->resume, "Go on where an interrupted build of the same output was");
     app->add_option("--checkpoint", command->checkpointSeconds,

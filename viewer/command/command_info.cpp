@@ -1,6 +1,7 @@
 // vcp info: what is in a .vcp, from its header and directory alone.
 #include <fmt/format.h>
 
+#include "octree/shard/sharded_reader.h"
 #include "viewer/command/commands.h"
 #include "viewer/command/source_arguments.h"
 #include "viewer/command/terminal/interrupt.h"
@@ -52,7 +53,13 @@ StoredBytes storedBytesOf(const Dataset& dataset) {
 
 const char* methodName(Method method) { return method == Method::Paper ? "paper" : "certified"; }
 
-Json toJson(const std::string& file, const Dataset& dataset) {
+/// Returns how many files a dataset is cut into; 0 where it is one.
+uint64_t shardsOf(const ByteReader& reader) {
+    const auto* sharded = dynamic_cast<const ShardedReader*>(&reader);
+    return sharded != nullptr ? sharded->manifest().header().shards : 0;
+}
+
+Json toJson(const std::string& file, const Dataset& dataset, uint64_t shards) {
     const FileHeader& h = dataset.header;
     Json levels = Json::array();
     const StoredBytes bytes = storedBytesOf(dataset);
@@ -73,6 +80,7 @@ Json toJson(const std::string& file, const Dataset& dataset) {
             {"version", h.version},
             {"method", methodName(h.method)},
             {"file_bytes", h.fileBytes},
+            {"shards", shards},
             {"triangles", h.triangles},
             {"degenerate_triangles", h.degenerateTriangles},
             {"vertices", h.vertices},
@@ -125,12 +133,16 @@ std::string bytesLine(const Dataset& dataset) {
     return line + '\n';
 }
 
-std::string summary(const std::string& file, const Dataset& dataset) {
+std::string summary(const std::string& file, const Dataset& dataset, uint64_t shards) {
     const FileHeader& h = dataset.header;
-    std::string text = fmt::format("{}: .vcp version {}, {}\n", file, h.version, formatBytes(h.fileBytes));
-    text += fmt::format("  mesh        {} ({} without area), {}, {}\n", formatCount(h.triangles, "triangle"),
-                        formatCount(h.degenerateTriangles), formatCount(h.vertices, "vertex", "vertices"),
-                        dataset.hasColour() ? "with colour" : "no colour");
+    std::string text = fmt::format("{}: .vcp version {}, {}{}\n", file, h.version, formatBytes(h.fileBytes),
+                                   shards > 0 ? " in " + formatCount(shards, "shard") : "");
+    const char* colour = dataset.hasColour() ? "with colour" : "no colour";
+    // Shards do not count: what they say must not depend on the rest of the scan.
+    text += h.triangles == 0 ? fmt::format("  mesh        a part of a scan, {}\n", colour)
+                             : fmt::format("  mesh        {} ({} without area), {}, {}\n",
+                                           formatCount(h.triangles, "triangle"), formatCount(h.degenerateTriangles),
+                                           formatCount(h.vertices, "vertex", "vertices"), colour);
     text += bytesLine(dataset);
     if (dataset.hasParts()) text += partsLine(h);
     text += fmt::format("  bounds      {:.9g} {:.9g} {:.9g}  to  {:.9g} {:.9g} {:.9g}\n", h.boundsMin[0],
@@ -161,10 +173,11 @@ Result<int> run(const InfoCommand& command) {
     const InterruptScope catching;
     VCP_TRY_ASSIGN(const auto reader, openReader(command.file, command.source));
     VCP_TRY_ASSIGN(const auto dataset, readDataset(*reader));
+    const uint64_t shards = shardsOf(*reader);
     if (command.report.json)
-        VCP_TRY(printJson(toJson(reader->name(), dataset)));
+        VCP_TRY(printJson(toJson(reader->name(), dataset, shards)));
     else
-        VCP_TRY(printLine(summary(reader->name(), dataset)));
+        VCP_TRY(printLine(summary(reader->name(), dataset, shards)));
     return 0;
 }
 

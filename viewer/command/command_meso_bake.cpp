@@ -86,7 +86,7 @@ Result<int> runBake(BakeMeso& command) {
     const auto start = std::chrono::steady_clock::now();
     const InterruptScope catching;
     VCP_TRY_ASSIGN(auto folder,
-                   OutputFolder::create(command.out, {.names = kBakedFiles,
+                   OutputFolder::create(command.out, {.isOurs = isBakedName,
                                                       .ofWhat = "a baked scan",
                                                       .overwrite = command.overwrite,
                                                       .howToReplace = "--overwrite replaces it",

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include "octree/dataset_reader.h"
+#include "octree/shard/shard_folder.h"
 #include "render/host_drawing.h"
 #include "viewer/command/commands.h"
 #include "viewer/command/manual/help_text.h"
@@ -20,7 +21,7 @@ struct PublishCommand {
 
 /// Refuses what the page would refuse: files that are not whole, and those that the processor does not draw.
 Result<void> checkScan(const std::string& file) {
-    VCP_TRY_ASSIGN(const auto reader, openFile(file));
+    VCP_TRY_ASSIGN(const auto reader, openDatasetFile(file));
     VCP_TRY_ASSIGN(const auto dataset, readDataset(*reader));
     return checkHostDraws(dataset, file);
 }
@@ -44,7 +45,7 @@ Result<int> run(const PublishCommand& command) {
 Command addPublish(CLI::App& vcp) {
     auto command = std::make_shared<PublishCommand>();
     CLI::App* app = vcp.add_subcommand("publish", "Make a folder that shows a .vcp file in a web page");
-    app->add_option("FILE", command->file, "A .vcp file")->type_name("")->required();
+    app->add_option("FILE", command->file, "A .vcp file, or a folder of shards")->type_name("")->required();
     app->add_option("-o,--output", command->output, "The folder to make")
         ->type_name("FOLDER")
         ->required()

@@ -5,6 +5,7 @@
 
 #include "builder/measure/surface_distance.h"
 #include "octree/image/image_assembly.h"
+#include "octree/shard/shard_folder.h"
 #include "octree/vcp_verify.h"
 #include "streaming/http_reader.h"
 #include "streaming/read_ahead.h"
@@ -41,31 +42,35 @@ bool showBytes(void* user, uint64_t done) {
     return !interrupted();
 }
 
-/// Checks header, directory and every byte of the file.
-Result<Dataset> checkBytes(const ByteReader& reader, ProgressStyle style) {
+/// Checks header, directory and every byte of the file; of shards also what each has beside.
+Result<Dataset> checkBytes(const ByteReader& reader, const ShardedReader* shards, ProgressStyle style) {
     auto dataset = readDataset(reader);
     if (!dataset) return dataset;
     ProgressDisplay display(style, stderr);
+    if (shards != nullptr)
+        VCP_TRY(verifyShards(*shards, [&](double share) {
+            display.update("checking the shards", share);
+            return !interrupted();
+        }));
     ByteProgress progress{&display, reader.size()};
     VCP_TRY(verifyFile(reader, showBytes, &progress));
     return dataset;
 }
 
 /// Reads the images of a file; none of those that take too much memory, with a warning.
-Result<ImageSet> imagesOf(const std::filesystem::path& path, const Dataset& dataset) {
+Result<ImageSet> imagesOf(const ByteReader& file, const Dataset& dataset) {
     constexpr uint64_t kMostBytes = uint64_t{4} << 30;
     if (!dataset.hasImages()) return ImageSet();
-    VCP_TRY_ASSIGN(const auto file, openFile(path));
-    VCP_TRY_ASSIGN(const auto pieces, ImagePieces::read(*file, dataset.header.images));
-    if (pieces->bytes() <= kMostBytes) return readAllImages(*file, pieces);
+    VCP_TRY_ASSIGN(const auto pieces, ImagePieces::read(file, dataset.header.images));
+    if (pieces->bytes() <= kMostBytes) return readAllImages(file, pieces);
     warnOnTerminal(
         fmt::format("{}: its images take {} MiB, and colours are compared where they take {} at most; the "
                     "colours of vertices are compared",
-                    path.string(), pieces->bytes() >> 20, kMostBytes >> 20));
+                    file.name(), pieces->bytes() >> 20, kMostBytes >> 20));
     return ImageSet();
 }
 
-Result<SurfaceDistance> measure(const VerifyCommand& command) {
+Result<SurfaceDistance> measure(const VerifyCommand& command, const std::shared_ptr<const ByteReader>& reader) {
     ProgressDisplay display(command.report.progressStyle(), stderr);
     display.update("reading the mesh", 0);
     const std::vector<std::filesystem::path> meshes(command.against.begin(), command.against.end());
@@ -77,7 +82,7 @@ Result<SurfaceDistance> measure(const VerifyCommand& command) {
     display.update("sorting the mesh", 0.1);
     const MeshBvh bvh(mesh);
     display.update("reading the level", 0.2);
-    VCP_TRY_ASSIGN(auto cache, PageCache::open(command.file));
+    VCP_TRY_ASSIGN(auto cache, PageCache::open(reader));
     const uint32_t levels = cache.dataset().header.levels;
     if (command.level != UINT32_MAX && command.level >= levels)
         return Error{.code = ErrorCode::Usage,
@@ -85,7 +90,7 @@ Result<SurfaceDistance> measure(const VerifyCommand& command) {
                      .file = command.file};
     VCP_TRY(cache.loadLevel(std::min(command.level, levels - 1)));
     if (cache.dataset().hasColour()) paint.loadImages();
-    VCP_TRY_ASSIGN(const auto images, imagesOf(command.file, cache.dataset()));
+    VCP_TRY_ASSIGN(const auto images, imagesOf(*reader, cache.dataset()));
     for (const std::string& warning : paint.warnings()) warnOnTerminal(warning);
 
     SurfaceDistanceOptions options;
@@ -168,16 +173,21 @@ Result<int> run(const VerifyCommand& command) {
     const InterruptScope catching;
     VCP_TRY_ASSIGN(const auto reader, openReader(command.file, command.source));
     const ReadAhead ahead(reader);
-    const auto dataset = checkBytes(ahead, command.report.progressStyle());
+    const auto* shards = dynamic_cast<const ShardedReader*>(reader.get());
+    const auto dataset = checkBytes(ahead, shards, command.report.progressStyle());
     if (!dataset) return broken(command, dataset.error());
 
     Json json = {{"ok", true}, {"pages", dataset->header.pages}, {"bytes", dataset->header.fileBytes}};
     std::string text = fmt::format("{}: intact, {}, {}", ahead.name(), formatCount(dataset->header.pages, "subvolume"),
                                    formatBytes(dataset->header.fileBytes));
+    if (shards != nullptr) {
+        json["shards"] = shards->manifest().header().shards;
+        text += fmt::format(" in {}", formatCount(shards->manifest().header().shards, "shard"));
+    }
     bool within = true;
     std::optional<SurfaceDistance> distance;
     if (!command.against.empty()) {
-        VCP_TRY_ASSIGN(distance, measure(command));
+        VCP_TRY_ASSIGN(distance, measure(command, reader));
         within = isWithin(*distance);
         json["ok"] = within;
         addDistances(json, *distance);

@@ -30,6 +30,8 @@ struct Command {
 Command addBuild(CLI::App& vcp);
 Command addBuildPlan(CLI::App& vcp);
 Command addBuildStep(CLI::App& vcp);
+Command addShard(CLI::App& vcp);
+Command addPack(CLI::App& vcp);
 Command addInfo(CLI::App& vcp);
 Command addVerify(CLI::App& vcp);
 Command addRender(CLI::App& vcp);

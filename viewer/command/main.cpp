@@ -128,10 +128,11 @@ int runCommandLine(int argc, char** argv) {
     setUpHelp(vcp);
     vcp.set_version_flag("--version", "vcp " VCP_VERSION, "Print the version")->group(help_group::kHelp);
     vcp.footer("`vcp help CMD` says how a command is used, `vcp CMD --help-all` names all its options.");
-    const std::vector<Command> commands = {
-        addBuild(vcp),   addInfo(vcp),   addVerify(vcp),  addRender(vcp), addView(vcp),      addExport(vcp),
-        addCompare(vcp), addStress(vcp), addPublish(vcp), addServe(vcp),  addBuildPlan(vcp), addBuildStep(vcp),
-        addBench(vcp),   addMeso(vcp),   addDevices(vcp), addHelp(vcp),   addManual(vcp),    addCompletions(vcp)};
+    const std::vector<Command> commands = {addBuild(vcp),   addInfo(vcp),   addVerify(vcp),    addRender(vcp),
+                                           addView(vcp),    addExport(vcp), addCompare(vcp),   addStress(vcp),
+                                           addPublish(vcp), addServe(vcp),  addBuildPlan(vcp), addBuildStep(vcp),
+                                           addShard(vcp),   addPack(vcp),   addBench(vcp),     addMeso(vcp),
+                                           addDevices(vcp), addHelp(vcp),   addManual(vcp),    addCompletions(vcp)};
     groupHelp(vcp);
     try {
         vcp.parse(argc, argv);

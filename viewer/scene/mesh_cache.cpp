@@ -16,6 +16,7 @@
 #include "octree/io/content_hash.h"
 #include "octree/io/output_file.h"
 #include "octree/io/regular_file.h"
+#include "octree/shard/shard_manifest.h"
 
 namespace vcp {
 
@@ -157,14 +158,18 @@ Result<fs::path> defaultCacheFolder() {
 }
 
 bool looksLikeDataset(const fs::path& path) {
+    std::error_code ignored;
+    if (fs::exists(path / kManifestName, ignored)) return true;
     std::array<char, 8> start{};
     const FileHeader header;
+    const ManifestHeader manifest;
     // A mesh may be a pipe, whose bytes are gone once they are read.
     const auto file = openRegularStream(path);
     if (file && std::fread(start.data(), 1, start.size(), file->get()) == start.size() &&
-        std::equal(start.begin(), start.end(), header.magic))
+        (std::equal(start.begin(), start.end(), header.magic) ||
+         std::equal(start.begin(), start.end(), manifest.magic)))
         return true;
-    return path.extension() == kExtension;
+    return path.extension() == kExtension || path.filename() == kManifestName;
 }
 
 std::vector<fs::path> MeshCache::sideFilesOf(const BuildOptions& options) const {

@@ -22,7 +22,8 @@ namespace vcp {
 /// Returns $XDG_CACHE_HOME/vcp, else $HOME/.cache/vcp. Errors: Io when neither is set.
 Result<std::filesystem::path> defaultCacheFolder();
 
-/// Returns true when the file starts like a .vcp, or has that extension. Returns false also when it cannot be read.
+/// Returns true when the file starts like a .vcp or a manifest of shards, or has the name of one, or is the folder of a
+/// manifest. Returns false also when it cannot be read.
 bool looksLikeDataset(const std::filesystem::path& path);
 
 class MeshCache {

@@ -7,6 +7,7 @@
 #include <glm/geometric.hpp>
 
 #include "octree/io/caught.h"
+#include "octree/shard/shard_folder.h"
 #include "streaming/caching_reader.h"
 #include "streaming/http_reader.h"
 #include "streaming/web_address.h"
@@ -14,18 +15,38 @@
 
 namespace vcp {
 
-Result<std::shared_ptr<const ByteReader>> openReader(const std::string& where, const SourceAccess& access) {
-    if (!isHttpUrl(where)) {
-        VCP_TRY_ASSIGN(auto file, openFile(where));
-        return std::shared_ptr<const ByteReader>(file);
-    }
+namespace {
+
+// What is asked for first: of a manifest, in one request, all that a first picture needs of most; of a shard that a
+// first picture does not need, little.
+constexpr uint64_t kFirstOfManifest = 256 << 10, kFirstOfShard = 4 << 10;
+
+/// Opens the file at an address. `firstBytes`: that are asked for at once.
+Result<std::shared_ptr<const ByteReader>> openRemote(const std::string& where, const SourceAccess& access,
+                                                     uint64_t firstBytes) {
     HttpOptions options;
+    options.firstBytes = firstBytes;
     options.caFile = access.caFile;
     options.cancelled = access.cancelled;
     VCP_TRY_ASSIGN(auto http, HttpReader::open(where, options));
     if (access.cache.empty()) return std::shared_ptr<const ByteReader>(http);
     VCP_TRY_ASSIGN(auto cached, CachingReader::open(http, http->identity(), access.cache, access.cacheBytes));
     return std::shared_ptr<const ByteReader>(cached);
+}
+
+}  // namespace
+
+Result<std::shared_ptr<const ByteReader>> openReader(const std::string& where, const SourceAccess& access) {
+    if (!isHttpUrl(where)) return openDatasetFile(where);
+    const bool isNamedSo = where.find(kManifestName) != std::string::npos;
+    VCP_TRY_ASSIGN(const auto file, openRemote(where, access, isNamedSo ? kFirstOfManifest : HttpOptions().firstBytes));
+    VCP_TRY_ASSIGN(const bool inShards, isManifest(*file));
+    if (!inShards) return file;
+    VCP_TRY_ASSIGN(auto reader, ShardedReader::open(file, [where, access](const ShardRow& shard, bool isFirst) {
+                       return openRemote(addressBeside(where, shardName(shard)), access,
+                                         isFirst ? HttpOptions().firstBytes : kFirstOfShard);
+                   }));
+    return std::shared_ptr<const ByteReader>(reader);
 }
 
 Box OpenDataset::bounds() const {

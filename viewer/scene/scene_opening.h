@@ -32,8 +32,8 @@ struct SourceAccess {
     std::function<bool()> cancelled = {};
 };
 
-/// Opens a path or an http(s) address, through the cache where one is asked for. Errors: those of openFile,
-/// HttpReader::open and CachingReader::open.
+/// Opens a path or an http(s) address, through the cache where one is asked for. A manifest of shards is read as the
+/// one file that it stands for. Errors: those of openDatasetFile, HttpReader::open and CachingReader::open.
 Result<std::shared_ptr<const ByteReader>> openReader(const std::string& where, const SourceAccess& access);
 
 /// A dataset opened for showing: of a large directory the beginning is read, and more as pages are asked for.

@@ -87,7 +87,10 @@ export class Module {
         return result;
     }
     error() {
-        const bytes = new Uint8Array(this.wasm.memory.buffer, this.wasm.vcp_error());
+        return this.textAt(this.wasm.vcp_error());
+    }
+    textAt(at) {
+        const bytes = new Uint8Array(this.wasm.memory.buffer, at);
         return new TextDecoder().decode(bytes.slice(0, bytes.indexOf(0)));
     }
     /// Returns true once header and directory are there.
@@ -99,6 +102,12 @@ export class Module {
         for (let i = 0, count = this.wasm.vcp_missing(); i < count; ++i)
             stretches.push({ offset: this.wasm.vcp_missing_offset(i), bytes: this.wasm.vcp_missing_bytes(i) });
         return stretches;
+    }
+    /// Where a stretch lies: the name of its file, beside the one that was begun with and empty for that one, and the
+    /// offset in it.
+    placeOf(offset) {
+        const span = this.wasm.vcp_file_span(), number = Math.floor(offset / span);
+        return { name: this.textAt(this.wasm.vcp_file_name(number)), offset: offset - number * span };
     }
     numbers(at, count) {
         return [...new Float64Array(this.wasm.memory.buffer, at, count)];

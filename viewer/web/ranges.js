@@ -125,3 +125,35 @@ export class Ranges {
             throw new ServerError(`${this.url}: the server hides Content-Range; it must send Access-Control-Expose-Headers: Content-Range`);
     }
 }
+
+/// The address of a file beside another, with the same query.
+export function addressBeside(url, name) {
+    const [, path, rest] = /^([^?#]*)(.*)$/.exec(url);
+    return path.slice(0, path.lastIndexOf('/') + 1) + name + rest;
+}
+
+/// The files that a scan is in, each read as Ranges are. `placeOf`: as the module's.
+export class Files {
+    constructor(url, fetch) {
+        this.url = url;
+        this.fetch = fetch;
+        this.first = new Ranges(url, fetch);
+        this.others = new Map(); // by name
+        this.placeOf = offset => ({ name: '', offset });
+    }
+
+    get size() { return this.first.size; }
+    get requests() { return this.sum(file => file.requests); }
+    get bytes() { return this.sum(file => file.bytes); }
+    sum(of) { return [this.first, ...this.others.values()].reduce((sum, file) => sum + of(file), 0); }
+
+    read(offset, bytes, options) {
+        const place = this.placeOf(offset);
+        return this.fileNamed(place.name).read(place.offset, bytes, options);
+    }
+    fileNamed(name) {
+        if (name === '') return this.first;
+        if (!this.others.has(name)) this.others.set(name, new Ranges(addressBeside(this.url, name), this.fetch));
+        return this.others.get(name);
+    }
+}

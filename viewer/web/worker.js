@@ -1,7 +1,7 @@
 // The first worker of a viewer: fetches, decodes, chooses pages and draws, with others where there are any (share.js), so
 // that the page never waits.
 import { Module } from './module.js';
-import { Ranges, joined, overlap, urgentFirst, without } from './ranges.js';
+import { Files, joined, overlap, urgentFirst, without } from './ranges.js';
 import { Caster, costsOf, partsOf } from './share.js';
 
 const kLead = 64 << 10;      // bytes of the first request: header, directory and the coarsest pages
@@ -32,10 +32,11 @@ async function open({ url, wasm, budgetBytes }) {
     const program = await fetch(wasm);
     if (!program.ok) throw new Error(`${wasm}: the server answers ${program.status}; copy the whole folder of the viewer`);
     module = await Module.load(program);
-    ranges = new Ranges(url);
+    ranges = new Files(url);
     const lead = await ranges.read(0, kLead);
     module.begin(ranges.size, url, budgetBytes);
     module.supply(0, lead);
+    ranges.placeOf = offset => module.placeOf(offset);
     while (!module.open()) await supply(module.missing());
     post('opened', { info: module.info() });
 }

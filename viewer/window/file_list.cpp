@@ -10,7 +10,8 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr const char* kExtensions[] = {".vcp", ".json", ".ply", ".obj", ".stl", ".off", ".gltf", ".glb", ".drc"};
+constexpr const char* kExtensions[] = {".vcp", ".vcps", ".json", ".ply", ".obj",
+                                       ".stl", ".off",  ".gltf", ".glb", ".drc"};
 
 std::string lowered(std::string text) {
     std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return char(std::tolower(c)); });

@@ -5,7 +5,7 @@
 import assert from 'node:assert/strict';
 import fs from 'node:fs';
 import {
-    CasterHere, Module, Orbit, Ranges, cast, check, checks, costsOf, hitsOf, joined, kFieldOfView, look, movingScale, opened, parseContentRange,
+    CasterHere, Files, Module, Orbit, Ranges, cast, check, checks, costsOf, hitsOf, joined, kFieldOfView, look, movingScale, opened, parseContentRange,
     partsOf, quick, server, settle, supply, urgentFirst, wasm, without,
 } from './module_use.mjs';
 import { compareDepth, readDepth } from './native_picture.mjs';
@@ -152,6 +152,34 @@ await check('bands cast from copies are those of the pool; no more is copied tha
     }
     console.log(`   ${pagesLeftOut} pages were not needed; ${partsLeft} parts were too large`);
     assert.ok(pagesLeftOut > 0 && partsLeft > 0);
+});
+
+await check('a scan in shards is drawn as the file is, from the shards that it needs', async () => {
+    const asked = new Set(), inFolder = (url, request) => {
+        const name = decodeURI(url).replace(/[?].*/, '').split('/').pop();
+        asked.add(name);
+        assert.ok(url.endsWith('?key=a'), url);
+        return server(fs.readFileSync(`shards/${name}`))(url, request);
+    };
+    const whole = new Ranges('scan.vcp', server(file)), shards = new Files('folder/manifest.vcps?key=a', inFolder);
+    const alone = await opened(whole), module = await opened(shards);
+    assert.deepEqual(module.info(), alone.info());
+    const orbit = new Orbit(), info = module.info();
+    orbit.fit(info.boundsMin, info.boundsMax, 1.6);
+    look(module, orbit);
+    for (let update = module.update(); !update.drawable; update = module.update()) await supply(module, shards);
+    console.log(`   first picture: ${shards.requests} requests, ${shards.bytes} bytes`);
+    assert.ok(shards.requests <= 5 && asked.size === 2, `${shards.requests} requests of ${asked.size} files`);
+    for (const zoom of [1, 0.1]) {
+        orbit.zoom(zoom, 0.3, 0.1);
+        look(module, orbit);
+        look(alone, orbit);
+        const updates = [await settle(module, shards, 64 << 20), await settle(alone, whole, 64 << 20)];
+        for (const is of ['errorPixels', 'residentBytes']) assert.equal(updates[0][is], updates[1][is], is);
+        assert.deepEqual(cast(module), cast(alone));
+    }
+    console.log(`   settled twice: ${shards.requests} requests, ${whole.requests} of the file; ${asked.size - 1} shards`);
+    assert.ok(asked.size - 1 < fs.readdirSync('shards').length - 1, 'not all shards are needed');
 });
 
 await check('what rays hit counts the same, whoever cast them', async () => {

@@ -7,7 +7,7 @@ import { pathToFileURL } from 'node:url';
 const web = process.argv[2];
 const file = name => import(pathToFileURL(path.join(web, name)));
 export const { Module } = await file('module.js');
-export const { Ranges, joined, parseContentRange, urgentFirst, without } = await file('ranges.js');
+export const { Files, Ranges, joined, parseContentRange, urgentFirst, without } = await file('ranges.js');
 export const { Caster, costsOf, partsOf } = await file('share.js');
 export const { Orbit, kFieldOfView, movingScale } = await file('camera.js');
 export const wasm = fs.readFileSync(path.join(web, 'vcp.wasm'));
@@ -41,6 +41,7 @@ export async function opened(ranges, budget = 64 << 20) {
     const lead = await ranges.read(0, 64 << 10);
     module.begin(ranges.size, 'scan.vcp', budget);
     module.supply(0, lead);
+    if (ranges instanceof Files) ranges.placeOf = offset => module.placeOf(offset);
     while (!module.open()) await supply(module, ranges);
     return module;
 }

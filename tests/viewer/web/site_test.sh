@@ -60,6 +60,15 @@ cmp scan.vcp empty/scan.vcp
 # Nothing may be left of what was not finished.
 [ -z "$(find . -name '*unfinished*')" ] || fail "left: $(find . -name '*unfinished*')"
 
+"$vcp" shard scan.vcp -o shards --size 64K --progress none >/dev/null
+"$vcp" publish shards -o parted --viewer viewer >/dev/null
+cmp shards/manifest.vcps parted/scan.vcp
+for shard in shards/*.vcp; do cmp "$shard" "parted/$(basename "$shard")"; done
+"$vcp" pack parted/scan.vcp -o packed.vcp --progress none >/dev/null
+cmp scan.vcp packed.vcp
+"$vcp" publish scan.vcp -o parted --viewer viewer --overwrite >/dev/null
+[ "$(ls -A parted | wc -l)" = 14 ] || fail "shards are left: $(ls -A parted)"
+
 expect 2 "no IPv4 address" "$vcp" serve site --address nowhere
 expect 1 "nothing_here" "$vcp" serve nothing_here
 expect 2 "is no folder" "$vcp" serve scan.ply

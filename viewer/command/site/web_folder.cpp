@@ -7,7 +7,6 @@
 #include <array>
 #include <cerrno>
 #include <cstdio>
-#include <span>
 #include <string>
 #include <string_view>
 #include <system_error>
@@ -17,6 +16,7 @@
 
 #include "octree/io/durable_file.h"
 #include "octree/io/output_folder.h"
+#include "octree/shard/shard_folder.h"
 
 namespace vcp {
 
@@ -29,14 +29,10 @@ constexpr std::array<std::string_view, 13> kViewerFiles{
     kPage,       "vcp-viewer.js", "vcp-viewer.d.ts", "worker.js", "module.js",     "camera.js", "markup.js",
     "ranges.js", "caster.js",     "share.js",        "fzstd.js",  "fzstd.LICENSE", "vcp.wasm"};
 
-/// All that a published folder holds.
-std::span<const std::string_view> folderFiles() {
-    static const std::vector<std::string_view> names = [] {
-        std::vector<std::string_view> all(kViewerFiles.begin(), kViewerFiles.end());
-        all.emplace_back(kScanInFolder);
-        return all;
-    }();
-    return names;
+/// Whether a published folder holds a file of this name.
+bool isPublishedName(std::string_view name) {
+    return name == kScanInFolder || isShardName(name) ||
+           std::find(kViewerFiles.begin(), kViewerFiles.end(), name) != kViewerFiles.end();
 }
 
 Error io(const fs::path& file, const char* what, const std::error_code& failed) {
@@ -55,6 +51,21 @@ Result<uint64_t> copyInto(const fs::path& from, const fs::path& to) {
     if (!isSynced) return systemError(to, "cannot be written", code);
     const uint64_t bytes = fs::file_size(to, failed);
     if (failed) return io(to, "its size cannot be asked", failed);
+    return bytes;
+}
+
+/// Copies a .vcp file into a folder, or a manifest, under the same name, with its shards. Returns their bytes.
+Result<uint64_t> copyScan(const fs::path& scan, const fs::path& to) {
+    VCP_TRY_ASSIGN(const auto reader, openDatasetFile(scan));
+    VCP_TRY_ASSIGN(uint64_t bytes, copyInto(reader->name(), to / kScanInFolder));
+    const auto* sharded = dynamic_cast<const ShardedReader*>(reader.get());
+    const uint64_t shards = sharded != nullptr ? sharded->manifest().header().shards : 0;
+    for (uint64_t number = 0; number < shards; ++number) {
+        VCP_TRY_ASSIGN(const auto row, sharded->manifest().shard(number));
+        const std::string name = shardName(row);
+        VCP_TRY_ASSIGN(const uint64_t copied, copyInto(fs::path(reader->name()).parent_path() / name, to / name));
+        bytes += copied;
+    }
     return bytes;
 }
 
@@ -80,7 +91,7 @@ Result<fs::path> findWebViewer(const fs::path& asked) {
 
 Result<uint64_t> writeWebFolder(const fs::path& viewer, const fs::path& scan, const fs::path& named, bool overwrite) {
     VCP_TRY_ASSIGN(auto made,
-                   OutputFolder::create(named, {.names = folderFiles(),
+                   OutputFolder::create(named, {.isOurs = isPublishedName,
                                                 .ofWhat = "a published scan",
                                                 .overwrite = overwrite,
                                                 .howToReplace = "--overwrite replaces it, but for its index.html"}));
@@ -92,7 +103,7 @@ Result<uint64_t> writeWebFolder(const fs::path& viewer, const fs::path& scan, co
         VCP_TRY_ASSIGN(const uint64_t copied, copyInto((isKept ? made.folder() : viewer) / name, to / name));
         bytes += copied;
     }
-    VCP_TRY_ASSIGN(const uint64_t copied, copyInto(scan, to / kScanInFolder));
+    VCP_TRY_ASSIGN(const uint64_t copied, copyScan(scan, to));
     VCP_TRY(made.commit());
     return bytes + copied;
 }

@@ -18,16 +18,8 @@ void FetchedBytes::supply(uint64_t offset, std::vector<std::byte> bytes) {
 
 std::vector<Stretch> FetchedBytes::takeMissing() { return std::exchange(missing_, {}); }
 
-Result<void> FetchedBytes::read(uint64_t offset, std::span<std::byte> bytes) const {
-    if (offset > size_ || bytes.size() > size_ - offset)
-        return Error{
-            .code = ErrorCode::Io, .message = "the file ends here; it was truncated", .file = name_, .byte = offset};
+bool FetchedBytes::read(uint64_t offset, std::span<std::byte> bytes) {
     const uint64_t end = offset + bytes.size();
-    if (end > refusedBehind_)
-        return Error{.code = ErrorCode::Limit,
-                     .message = "the tables of its images are too large for a browser, which shows none of these",
-                     .file = name_,
-                     .byte = offset};
     bool isWhole = true;
     for (uint64_t at = offset; at < end;) {
         // The bytes may lie in several pieces, with or without gaps between them.
@@ -46,14 +38,55 @@ Result<void> FetchedBytes::read(uint64_t offset, std::span<std::byte> bytes) con
         }
         at = until;
     }
-    if (isWhole) return {};
-    return Error::cancelled(name_);
+    return isWhole;
 }
 
-void FetchedBytes::distrust(uint64_t offset, uint64_t bytes) const {
+void FetchedBytes::forget(uint64_t offset, uint64_t bytes) {
     pieces_.remove_if([&](const Piece& piece) {
         return piece.offset < offset + bytes && offset < piece.offset + piece.bytes.size();
     });
+}
+
+Result<void> FetchedFile::read(uint64_t offset, std::span<std::byte> bytes) const {
+    if (offset > size_ || bytes.size() > size_ - offset)
+        return Error{
+            .code = ErrorCode::Io, .message = "the file ends here; it was truncated", .file = name_, .byte = offset};
+    if (bytes_->read(begin_ + offset, bytes)) return {};
+    return Error::cancelled(name_);
+}
+
+Result<std::shared_ptr<FetchedDataset>> FetchedDataset::open(const std::shared_ptr<FetchedBytes>& bytes, uint64_t size,
+                                                             const std::string& name) {
+    std::shared_ptr<FetchedDataset> opened(new FetchedDataset());
+    auto file = std::make_shared<const FetchedFile>(bytes, 0, size, name);
+    VCP_TRY_ASSIGN(const bool inShards, isManifest(*file));
+    if (!inShards) {
+        opened->dataset_ = std::move(file);
+        return opened;
+    }
+    const auto openShard = [bytes, files = opened->files_](const ShardRow& shard,
+                                                           bool) -> Result<std::shared_ptr<const ByteReader>> {
+        // A shard that was let go keeps its number.
+        const std::string named = shardName(shard);
+        const auto known = std::find(files->begin(), files->end(), named);
+        const auto number = uint64_t(known - files->begin());
+        if (known == files->end()) files->push_back(named);
+        if (shard.bytes > kFileSpan)
+            return Error{.code = ErrorCode::Limit, .message = "is too large for a browser", .file = named};
+        return std::shared_ptr<const ByteReader>(
+            std::make_shared<const FetchedFile>(bytes, number, shard.bytes, named));
+    };
+    VCP_TRY_ASSIGN(opened->dataset_, ShardedReader::open(std::move(file), openShard));
+    return opened;
+}
+
+Result<void> FetchedDataset::read(uint64_t offset, std::span<std::byte> bytes) const {
+    if (offset + bytes.size() > refusedBehind_)
+        return Error{.code = ErrorCode::Limit,
+                     .message = "the tables of its images are too large for a browser, which shows none of these",
+                     .file = name(),
+                     .byte = offset};
+    return dataset_->read(offset, bytes);
 }
 
 }  // namespace vcp

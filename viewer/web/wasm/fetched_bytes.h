@@ -1,48 +1,88 @@
-// The bytes of a file that a page in a browser has fetched so far.
+// The bytes of files that a page in a browser has fetched so far: of a .vcp file, or of a manifest and its shards.
 #pragma once
 
 #include <cstdint>
 #include <list>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "octree/io/byte_reader.h"
+#include "octree/shard/sharded_reader.h"
 
 namespace vcp {
 
-/// A stretch of a file.
+/// A stretch of what is fetched.
 struct Stretch {
     uint64_t offset = 0, bytes = 0;
 };
 
-/// Reads what was fetched. Where bytes have not come it notes them as missing and returns Cancelled.
-class FetchedBytes final : public ByteReader {
+/// Files have their bytes in one row of numbers: those of file k begin at k * kFileSpan.
+inline constexpr uint64_t kFileSpan = uint64_t{1} << 36;
+
+/// Keeps what was fetched, and notes what is missing.
+class FetchedBytes {
 public:
     /// `mostBytes`: what was fetched first goes where more is kept; whoever still needs it misses it again.
-    FetchedBytes(uint64_t size, std::string name, uint64_t mostBytes)
-        : size_(size), mostBytes_(mostBytes), name_(std::move(name)) {}
+    explicit FetchedBytes(uint64_t mostBytes) : mostBytes_(mostBytes) {}
 
     void supply(uint64_t offset, std::vector<std::byte> bytes);
-    /// Reads that end behind `end` fail as Limit, from now on.
-    void refuseBehind(uint64_t end) { refusedBehind_ = end; }
     /// Returns what was missing since the last call.
     std::vector<Stretch> takeMissing();
-
-    Result<void> read(uint64_t offset, std::span<std::byte> bytes) const override;
-    [[nodiscard]] uint64_t size() const override { return size_; }
-    [[nodiscard]] const std::string& name() const override { return name_; }
+    /// Returns whether all came; what has not is noted as missing.
+    bool read(uint64_t offset, std::span<std::byte> bytes);
     /// Forgets the bytes, so that they are fetched anew.
-    void distrust(uint64_t offset, uint64_t bytes) const override;
+    void forget(uint64_t offset, uint64_t bytes);
 
 private:
     struct Piece {
         uint64_t offset;
         std::vector<std::byte> bytes;
     };
-    uint64_t size_, mostBytes_, refusedBehind_ = UINT64_MAX;
+    uint64_t mostBytes_;
+    std::list<Piece> pieces_;  // the oldest first
+    std::vector<Stretch> missing_;
+};
+
+/// Reads a file of those that are fetched. Where bytes have not come, reads are Cancelled.
+class FetchedFile final : public ByteReader {
+public:
+    FetchedFile(std::shared_ptr<FetchedBytes> bytes, uint64_t number, uint64_t size, std::string name)
+        : bytes_(std::move(bytes)), begin_(number * kFileSpan), size_(size), name_(std::move(name)) {}
+
+    Result<void> read(uint64_t offset, std::span<std::byte> bytes) const override;
+    [[nodiscard]] uint64_t size() const override { return size_; }
+    [[nodiscard]] const std::string& name() const override { return name_; }
+    void distrust(uint64_t offset, uint64_t bytes) const override { bytes_->forget(begin_ + offset, bytes); }
+
+private:
+    std::shared_ptr<FetchedBytes> bytes_;
+    uint64_t begin_, size_;
     std::string name_;
-    mutable std::list<Piece> pieces_;  // the oldest first
-    mutable std::vector<Stretch> missing_;
+};
+
+/// Reads the dataset that file 0 is, or whose manifest it is.
+class FetchedDataset final : public ByteReader {
+public:
+    /// Errors: Cancelled, until the beginning of file 0 has come; those of ShardedReader::open.
+    static Result<std::shared_ptr<FetchedDataset>> open(const std::shared_ptr<FetchedBytes>& bytes, uint64_t size,
+                                                        const std::string& name);
+
+    /// Reads that end behind `end` fail as Limit, from now on.
+    void refuseBehind(uint64_t end) { refusedBehind_ = end; }
+    /// Returns the name of the file that has a number: beside file 0, whose own is empty.
+    [[nodiscard]] const std::string& fileNamed(uint64_t number) const { return (*files_)[number]; }
+
+    Result<void> read(uint64_t offset, std::span<std::byte> bytes) const override;
+    [[nodiscard]] uint64_t size() const override { return dataset_->size(); }
+    [[nodiscard]] const std::string& name() const override { return dataset_->name(); }
+    void distrust(uint64_t offset, uint64_t bytes) const override { dataset_->distrust(offset, bytes); }
+
+private:
+    FetchedDataset() = default;
+    std::shared_ptr<const ByteReader> dataset_;
+    std::shared_ptr<std::vector<std::string>> files_ = std::make_shared<std::vector<std::string>>(1);  // by number
+    uint64_t refusedBehind_ = UINT64_MAX;
 };
 
 }  // namespace vcp

@@ -58,7 +58,10 @@ enum class Images : uint8_t { Awaited, Shown, GivenUp };
 
 /// What is open.
 struct Opened {
-    std::shared_ptr<FetchedBytes> bytes;
+    std::string name;   // of file 0
+    uint64_t size = 0;  // of it
+    std::shared_ptr<FetchedBytes> fetched;
+    std::shared_ptr<FetchedDataset> bytes;  // null until file 0 has begun to come
     std::shared_ptr<const Dataset> dataset;
     bool hasColour = false;
     std::vector<PlacedDataset> datasets;       // one, in the worker that holds the pages
@@ -110,6 +113,15 @@ Result<void> start(Dataset dataset) {
     opened.errorPixels = std::numeric_limits<double>::infinity();
     opened.hasColour = residency().hasColour();
     return {};
+}
+
+/// Errors: Cancelled, until header and directory have come.
+Result<void> openDataset() {
+    if (!opened.bytes) {
+        VCP_TRY_ASSIGN(opened.bytes, FetchedDataset::open(opened.fetched, opened.size, opened.name));
+    }
+    VCP_TRY_ASSIGN(auto dataset, readDatasetStart(*opened.bytes));
+    return start(std::move(dataset));
 }
 
 /// Whether some page that is drawn has triangles with images.
@@ -180,24 +192,32 @@ EXPORT(vcp_begin) void vcp_begin(double size, const char* name, double budgetByt
     opened = {};
     jpegTiles() = {};
     opened.budgetBytes = uint64_t(budgetBytes);
-    opened.bytes = std::make_shared<FetchedBytes>(uint64_t(size), name, kFetchedBytes);
+    opened.name = name;
+    opened.size = uint64_t(size);
+    opened.fetched = std::make_shared<FetchedBytes>(kFetchedBytes);
 }
 
 EXPORT(vcp_supply) void vcp_supply(double offset, const std::byte* bytes, size_t count) {
-    opened.bytes->supply(uint64_t(offset), {bytes, bytes + count});
+    opened.fetched->supply(uint64_t(offset), {bytes, bytes + count});
 }
 
 /// Returns kMissing until header and directory have come.
 EXPORT(vcp_open) int vcp_open() {
-    auto dataset = readDatasetStart(*opened.bytes);
-    if (!dataset) return dataset.error().code == ErrorCode::Cancelled ? kMissing : fail(dataset.error());
-    if (const auto started = start(*std::move(dataset)); !started) return fail(started.error());
-    return kDone;
+    const auto done = openDataset();
+    if (done) return kDone;
+    return done.error().code == ErrorCode::Cancelled ? kMissing : fail(done.error());
 }
+
+/// Returns the name of a file that is fetched, which lies beside file 0; empty for file 0 itself.
+EXPORT(vcp_file_name) const char* vcp_file_name(int number) {
+    return opened.bytes ? opened.bytes->fileNamed(uint64_t(number)).c_str() : "";
+}
+/// Returns how far the first bytes of two files whose numbers follow each other are apart.
+EXPORT(vcp_file_span) double vcp_file_span() { return double(kFileSpan); }
 
 /// Returns how many stretches of the file were missing since the last call.
 EXPORT(vcp_missing) int vcp_missing() {
-    opened.missing = opened.bytes->takeMissing();
+    opened.missing = opened.fetched->takeMissing();
     return int(opened.missing.size());
 }
 EXPORT(vcp_missing_offset) double vcp_missing_offset(int i) { return double(opened.missing[size_t(i)].offset); }

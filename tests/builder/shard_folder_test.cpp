@@ -1,0 +1,137 @@
+// Scans in shards: each shard is a .vcp file that is intact, the one file comes back, and what a change of one part of
+// the scan leaves as it is keeps its shards.
+#include "octree/shard/shard_folder.h"
+
+#include <cmath>
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include "builder/build.h"
+#include "octree/vcp_verify.h"
+#include "tests/support/mesh_files.h"
+#include "tests/support/test_folder.h"
+#include "tests/support/test_meshes.h"
+#include "tests/support/textured_walls.h"
+
+namespace vcp {
+namespace {
+
+namespace fs = std::filesystem;
+
+const auto kGoOn = [](double) { return true; };
+
+class ShardFolder : public ::testing::Test {
+protected:
+    BuildReport build(std::vector<fs::path> inputs, double cell) const {
+        BuildOptions o;
+        o.inputs = std::move(inputs);
+        o.output = whole();
+        o.cell = cell;
+        o.threads = 2;
+        const auto report = buildOctree(o);
+        EXPECT_TRUE(report.ok()) << report.error().line();
+        return report ? *report : BuildReport{};
+    }
+    ShardReport split(uint64_t shardBytes) const {
+        const auto report = writeShards(**openFile(whole()), {.folder = shards(), .shardBytes = shardBytes});
+        EXPECT_TRUE(report.ok()) << report.error().line();
+        return report ? *report : ShardReport{};
+    }
+    /// Expects each shard to be intact, and the one file to come back.
+    void expectWhole() const {
+        for (const auto& entry : fs::directory_iterator(shards())) {
+            const auto reader = openDatasetFile(entry.path());
+            ASSERT_TRUE(reader.ok()) << reader.error().line();
+            const auto intact = verifyFile(**reader);
+            EXPECT_TRUE(intact.ok()) << intact.error().line();
+        }
+        const auto reader = openDatasetFile(shards());
+        ASSERT_TRUE(reader.ok());
+        const auto packed = packShards(**reader, folder_ / "packed.vcp", {}, kGoOn);
+        ASSERT_TRUE(packed.ok()) << packed.error().line();
+        EXPECT_TRUE(contentOf(folder_ / "packed.vcp") == contentOf(whole()));
+    }
+    fs::path whole() const { return folder_ / "whole.vcp"; }
+    fs::path shards() const { return folder_ / "shards"; }
+
+    TestFolder folder_{"vcp_shard_folder"};
+};
+
+TEST_F(ShardFolder, OfAScanWithColours) {
+    writeBall(folder_ / "ball.ply", 60, 120);
+    build({folder_ / "ball.ply"}, 0.004);
+    EXPECT_GT(split(fs::file_size(whole()) / 12).shards, 8u);
+    expectWhole();
+}
+
+TEST_F(ShardFolder, OfAScanWithImages) {
+    test::TexturedWalls::write(
+        folder_.path(), [](uint32_t x, uint32_t y) { return x * 2 | y * 5 << 8 | (x + y) << 16; },
+        [](uint32_t x, uint32_t y) { return (x / 4 + y / 4) % 2 == 0 ? 0xffffffu : 0x4060u; });
+    build({folder_ / "walls.obj"}, 0.004);
+    // Pages are so small that each with children begins a shard.
+    EXPECT_GT(split(4000).shards, 3u);
+    expectWhole();
+}
+
+/// Hills in tiles of 8 x 8; `raised`: how much higher the hills of one tile in the middle are, less near its edge.
+void writeTile(const fs::path& path, int column, int row, double raised) {
+    constexpr int kSteps = 48;
+    IndexedMesh mesh;
+    for (int y = 0; y <= kSteps; ++y)
+        for (int x = 0; x <= kSteps; ++x) {
+            const double u = column + double(x) / kSteps, v = row + double(y) / kSteps;
+            const double inside = std::sin(M_PI * x / kSteps) * std::sin(M_PI * y / kSteps);
+            const double height = 0.05 * std::sin(5 * u) * std::cos(4 * v) + raised * inside * inside;
+            mesh.positions.emplace_back(float(u), float(v), float(height));
+        }
+    for (uint32_t y = 0; y < kSteps; ++y)
+        for (uint32_t x = 0; x < kSteps; ++x) {
+            const uint32_t a = y * (kSteps + 1) + x, d = a + kSteps + 1;
+            mesh.triangles.push_back({a, a + 1, d + 1});
+            mesh.triangles.push_back({a, d + 1, d});
+        }
+    test::writePly(mesh, path);
+}
+
+TEST_F(ShardFolder, AReplacedTileLeavesOtherShardsAsTheyAre) {
+    std::vector<fs::path> tiles;
+    for (int row = 0; row < 8; ++row)
+        for (int column = 0; column < 8; ++column) {
+            tiles.push_back(folder_ / fmt::format("tile-{}-{}.ply", row, column));
+            writeTile(tiles.back(), column, row, 0);
+        }
+    build(tiles, 0.03);
+    const uint64_t shardBytes = fs::file_size(whole()) / 40;
+    const ShardReport before = split(shardBytes);
+    EXPECT_GT(before.shards, 40u);
+    writeTile(folder_ / "tile-2-5.ply", 5, 2, 0.01);
+    build(tiles, 0.03);
+    const ShardReport after = split(shardBytes);
+    EXPECT_EQ(after.shards, before.shards);
+    // The shards with the tile, those beside it that its cells' neighbours touch, and those above.
+    EXPECT_GE(after.shardsKept + 8, after.shards);
+    EXPECT_LT(after.shardsKept, after.shards);
+    expectWhole();
+}
+
+TEST_F(ShardFolder, PackingChecksWhatItReads) {
+    writeBall(folder_ / "ball.ply", 30, 60);
+    build({folder_ / "ball.ply"}, 0.01);
+    split(fs::file_size(whole()) / 6);
+    for (const auto& entry : fs::directory_iterator(shards())) {
+        if (!isShardName(entry.path().filename().string())) continue;
+        std::string content = contentOf(entry.path());
+        content[content.size() / 2] = char(content[content.size() / 2] ^ 4);
+        fs::permissions(entry.path(), fs::perms::owner_write, fs::perm_options::add);
+        std::ofstream(entry.path(), std::ios::binary) << content;
+    }
+    const auto reader = openDatasetFile(shards());
+    ASSERT_TRUE(reader.ok());
+    EXPECT_FALSE(packShards(**reader, folder_ / "packed.vcp", {}, kGoOn).ok());
+    EXPECT_FALSE(fs::exists(folder_ / "packed.vcp"));
+}
+
+}  // namespace
+}  // namespace vcp
