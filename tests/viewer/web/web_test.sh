@@ -34,8 +34,10 @@ for view in whole close; do
     "$vcp" render textured/lossless.vcp --device host --camera textured/$view.json --size 320x200 --samples 1 --shading unlit \
         --depth textured/$view.pfm -o textured/$view.png --overwrite --progress none
 done
+"$make_scan" --triangles 300000 --colour -o large.ply
+"$vcp" build large.ply -o large.vcp --overwrite --progress none
 rm -rf shards
-"$vcp" shard scan.vcp -o shards --size 64K --progress none
+"$vcp" shard large.vcp -o shards --size 64K --progress none
 "$hostile_files" hostile.bin 2000 "$here"/../../fuzz/seeds/fuzz_file/* small.vcp small/lossless.vcp small/jpeg.vcp
 "$node" "$here/module_test.mjs" "$folder" scan.vcp hostile.bin whole close
 "$node" "$here/image_test.mjs" "$folder" textured
