@@ -21,6 +21,8 @@
 #include <string>
 #include <vector>
 
+#include <glm/vec3.hpp>
+
 #include "builder/stream/side_file.h"
 #include "octree/io/result.h"
 
@@ -65,8 +67,11 @@ struct BuildOptions {
     std::string format;  ///< format of inputs whose content does not tell it (meshFormats())
     std::filesystem::path output;
     bool overwrite = false;  ///< also replaces an output that is no dataset (octree/io/output_file.h); never an input
-    double cell = 0;   ///< finest cell edge, world units, where triangles are not crowded; 0: chosen from the mesh
-    double error = 0;  ///< tolerated distance to the mesh, world units; 0: the finest level is the mesh
+    double cell = 0;  ///< finest cell edge, world units, where triangles are not crowded; 0: chosen from the mesh
+    /// Where the root page begins, world units; none: a cell before the mesh's bounds. With it and a given cell, what
+    /// of a mesh stays as it is when another part changes is built to the same pages.
+    std::optional<glm::dvec3> origin = {};
+    double error = 0;               ///< tolerated distance to the mesh, world units; 0: the finest level is the mesh
     bool errorIsRelative = false;   ///< `error` is a fraction of the bounding box's diagonal
     unsigned threads = 0;           ///< 0: one a processor
     uint64_t memoryBytes = 0;       ///< cap on what the build allocates; 0: defaultMemoryBytes()

@@ -196,10 +196,12 @@ Result<void> reopenSpools(std::deque<PageSpool>& spools, const SpoolLengths& len
 std::string settingsText(const BuildOptions& options) {
     // How images are coded matters where some are kept.
     const ImageQuality quality = keepsImages(options) ? options.imageQuality : ImageQuality();
-    return fmt::format("{} {:a} {:a} {} {} {} {} {} {} {} {} {}", kFileVersion, options.cell, options.error,
-                       options.errorIsRelative, int(options.colour), int(options.coarseLeaves), keepsImages(options),
-                       quality.finest.value_or(-1), quality.coarser.value_or(-1), int(options.vertexNormals),
-                       options.masks, options.format);
+    std::string text = fmt::format("{} {:a} {:a} {} {} {} {} {} {} {} {} {}", kFileVersion, options.cell, options.error,
+                                   options.errorIsRelative, int(options.colour), int(options.coarseLeaves),
+                                   keepsImages(options), quality.finest.value_or(-1), quality.coarser.value_or(-1),
+                                   int(options.vertexNormals), options.masks, options.format);
+    if (options.origin) text += fmt::format(" {:a} {:a} {:a}", options.origin->x, options.origin->y, options.origin->z);
+    return text;
 }
 
 std::string buildFingerprint(const BuildOptions& options) {

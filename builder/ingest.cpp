@@ -326,9 +326,18 @@ Result<GridFrame> chooseFrame(const BuildOptions& options, const SoupMeasures& m
     if (longest * kLatticePerCell < frame.cell)
         return badInput(options,
                         fmt::format("all of it is smaller than 1/{} cell; use a smaller cell edge", kLatticePerCell));
-    const double cellsAcross = longest / frame.cell + 2;
+    frame.origin = options.origin.value_or(m.boundsMin - glm::dvec3(frame.cell));
+    const glm::dvec3 before = m.boundsMin - frame.origin, across = m.boundsMax - frame.origin;
+    if (options.origin && std::min({before.x, before.y, before.z}) < frame.cell)
+        return badInput(options, fmt::format("it begins at {:.9g} {:.9g} {:.9g}, which is not a cell behind the origin "
+                                             "that is asked for; let that be smaller",
+                                             m.boundsMin.x, m.boundsMin.y, m.boundsMin.z));
+    const double cellsAcross =
+        (options.origin ? std::max({across.x, across.y, across.z}) / frame.cell : longest / frame.cell + 1) + 1;
+    if (cellsAcross > kMaxExtentCells + 2)
+        return badInput(options, fmt::format("it ends more than 2^20 cells of {:g} behind the origin that is asked for",
+                                             frame.cell));
     while (std::ldexp(1.0, int(frame.log2Cells + frame.levels - 1)) < cellsAcross) ++frame.levels;
-    frame.origin = m.boundsMin - glm::dvec3(frame.cell);
     return frame;
 }
 

@@ -215,6 +215,7 @@ size_t HttpConnection::onBody(char* data, size_t, size_t bytes, void* user) {
 }
 
 HttpConnection::HttpConnection(const HttpOptions& options) : options_(options) {
+    options_.connections.reset();  // which have this one
     // curl is started once a process; libcurl counts, and is safe to call from several threads since 7.84.
     static const CURLcode started = curl_global_init(CURL_GLOBAL_DEFAULT);
     if (started != CURLE_OK) return;
@@ -314,5 +315,24 @@ Result<HttpAnswer> HttpConnection::get(const WebAddress& address, const std::str
     }
     return lasting(fmt::format("more than {} redirects", kMostRedirects));
 }
+
+std::unique_ptr<HttpConnection> HttpConnections::take(const HttpOptions& options) {
+    {
+        const std::lock_guard lock(mutex_);
+        if (!idle_.empty()) {
+            auto connection = std::move(idle_.back());
+            idle_.pop_back();
+            return connection;
+        }
+    }
+    return std::make_unique<HttpConnection>(options);
+}
+
+void HttpConnections::giveBack(std::unique_ptr<HttpConnection> connection) {
+    const std::lock_guard lock(mutex_);
+    idle_.push_back(std::move(connection));
+}
+
+std::shared_ptr<HttpConnections> sharedConnections() { return std::make_shared<HttpConnections>(); }
 
 }  // namespace vcp

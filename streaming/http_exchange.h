@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cstdint>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <span>
 #include <string>
@@ -80,6 +81,18 @@ private:
     void* curl_ = nullptr;
     void* multi_ = nullptr;
     HttpOptions options_;
+};
+
+/// Connections that wait for their next request. Any thread.
+class HttpConnections {
+public:
+    /// Returns one that waits, or a new one.
+    std::unique_ptr<HttpConnection> take(const HttpOptions& options);
+    void giveBack(std::unique_ptr<HttpConnection> connection);
+
+private:
+    std::mutex mutex_;
+    std::vector<std::unique_ptr<HttpConnection>> idle_;
 };
 
 }  // namespace vcp

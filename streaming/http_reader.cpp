@@ -61,7 +61,6 @@ struct HttpReader::State {
     std::atomic<uint64_t> epoch{0}, requests{0}, received{0};
 
     std::mutex mutex;
-    std::vector<std::unique_ptr<HttpConnection>> idle;
     std::optional<Error> changed;  // once the file has changed, every read fails at once
     struct Stretch {
         uint64_t begin = 0;
@@ -131,22 +130,16 @@ Error HttpReader::State::changedNow() {
 }
 
 Result<HttpAnswer> HttpReader::State::get(const std::string& ranges, uint64_t most) {
-    std::unique_ptr<HttpConnection> connection;
     {
         const std::lock_guard lock(mutex);
         if (changed) return *changed;
-        if (!idle.empty()) {
-            connection = std::move(idle.back());
-            idle.pop_back();
-        }
     }
-    if (!connection) connection = std::make_unique<HttpConnection>(options);
+    auto connection = options.connections->take(options);
     ++requests;
     auto answer = connection->get(address, ranges, condition, most, epoch);
     if (!answer) return fail(answer.error().code, answer.error().message);
     received += answer->body.size();
-    const std::lock_guard lock(mutex);
-    idle.push_back(std::move(connection));
+    options.connections->giveBack(std::move(connection));
     return answer;
 }
 
@@ -265,6 +258,7 @@ Result<std::shared_ptr<HttpReader>> HttpReader::open(const std::string& url, con
     if (!address) return state->fail(ErrorCode::InvalidInput, "is not an address of a file on a server");
     state->address = *std::move(address);
     state->options = options;
+    if (!state->options.connections) state->options.connections = sharedConnections();
     VCP_TRY(state->begin());
     return std::shared_ptr<HttpReader>(new HttpReader(std::move(state)));
 }

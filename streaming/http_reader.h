@@ -10,7 +10,7 @@
 // An answer is accepted as a whole or not at all: status 206, the range that was asked for, of a file of the
 // same size, neither a byte short nor a byte long, and no content coding. Redirects are followed, at most 5,
 // never from https to http. TLS certificates are verified. Each reading thread has a connection of its own,
-// kept alive between reads; HTTP/2 where the server offers it.
+// kept alive between reads, which readers may share; HTTP/2 where the server offers it.
 //
 // Every exchange is bounded: in time by a least rate and by an end that follows from the bytes asked for
 // (exchange_pace.h), in bytes by what was asked for and by the bytes of all headers, in memory by what has come. A user
@@ -29,6 +29,8 @@
 
 namespace vcp {
 
+class HttpConnections;
+
 struct HttpOptions {
     std::filesystem::path caFile = {};  ///< certificates of authorities to trust, PEM; empty: the system's
     double connectSeconds = 10;
@@ -38,7 +40,12 @@ struct HttpOptions {
     uint64_t firstBytes = 64 << 10;   ///< bytes that the first request asks for
     /// Once it returns true, reads end soon with Cancelled. Reading threads call it, as long as the reader lives.
     std::function<bool()> cancelled = {};
+    /// Connections that readers of files on one server share (sharedConnections); null: the reader has its own.
+    std::shared_ptr<HttpConnections> connections = {};
 };
+
+/// Makes connections for several readers, whose other options are the same.
+std::shared_ptr<HttpConnections> sharedConnections();
 
 /// The server is not trusted: what it sends is checked before it is used, and no answer takes more memory
 /// than a few times what has come of it, nor more than was asked for (and 4 KiB, and its header).

@@ -55,6 +55,7 @@ json jsonOf(const PartPlan& plan) {
             {"overwrite", o.overwrite},
             {"format", o.format},
             {"cell", o.cell},
+            {"origin", o.origin ? json{o.origin->x, o.origin->y, o.origin->z} : json()},
             {"colour", int(o.colour)},
             {"images", keepsImages(o)},
             {"image_quality", {o.imageQuality.finest.value_or(-1), o.imageQuality.coarser.value_or(-1)}},
@@ -76,6 +77,8 @@ PartPlan planFrom(const json& j) {
     plan.options.overwrite = j.at("overwrite").get<bool>();
     plan.options.format = j.at("format").get<std::string>();
     plan.options.cell = j.at("cell").get<double>();
+    if (const json& origin = j.at("origin"); !origin.is_null())
+        plan.options.origin = {origin.at(0).get<double>(), origin.at(1).get<double>(), origin.at(2).get<double>()};
     plan.options.colour = ColourChoice(j.at("colour").get<int>());
     plan.options.keepImages = j.at("images").get<bool>();
     const auto quality = j.at("image_quality").get<std::array<int, 2>>();

@@ -23,11 +23,12 @@ const auto kGoOn = [](double) { return true; };
 
 class ShardFolder : public ::testing::Test {
 protected:
-    BuildReport build(std::vector<fs::path> inputs, double cell) const {
+    BuildReport build(std::vector<fs::path> inputs, double cell, std::optional<glm::dvec3> origin = {}) const {
         BuildOptions o;
         o.inputs = std::move(inputs);
         o.output = whole();
         o.cell = cell;
+        o.origin = origin;
         o.threads = 2;
         const auto report = buildOctree(o);
         EXPECT_TRUE(report.ok()) << report.error().line();
@@ -102,18 +103,35 @@ TEST_F(ShardFolder, AReplacedTileLeavesOtherShardsAsTheyAre) {
             tiles.push_back(folder_ / fmt::format("tile-{}-{}.ply", row, column));
             writeTile(tiles.back(), column, row, 0);
         }
-    build(tiles, 0.03);
+    const glm::dvec3 origin(-0.1, -0.1, -0.5);
+    build(tiles, 0.03, origin);
     const uint64_t shardBytes = fs::file_size(whole()) / 40;
     const ShardReport before = split(shardBytes);
     EXPECT_GT(before.shards, 20u);
-    writeTile(folder_ / "tile-2-5.ply", 5, 2, 0.01);
-    build(tiles, 0.03);
+    // So high that the bounds are others.
+    writeTile(folder_ / "tile-2-5.ply", 5, 2, 0.1);
+    build(tiles, 0.03, origin);
     const ShardReport after = split(shardBytes);
     EXPECT_EQ(after.shards, before.shards);
     // The shards with the tile, those beside it that its cells' neighbours touch, and those above.
     EXPECT_GE(after.shardsKept + 8, after.shards);
     EXPECT_LT(after.shardsKept, after.shards);
     expectWhole();
+}
+
+TEST_F(ShardFolder, AnOriginInsideOfTheMeshIsRefused) {
+    writeTile(folder_ / "tile.ply", 0, 0, 0);
+    BuildOptions o;
+    o.inputs = {folder_ / "tile.ply"};
+    o.output = whole();
+    o.cell = 0.03;
+    for (const glm::dvec3 origin : {glm::dvec3(0.5, -1, -1), glm::dvec3(-1, -0.02, -1), glm::dvec3(-1, -1, -1e9)}) {
+        o.origin = origin;
+        const auto report = buildOctree(o);
+        ASSERT_FALSE(report.ok());
+        EXPECT_NE(report.error().line().find("the origin that is asked for"), std::string::npos)
+            << report.error().line();
+    }
 }
 
 TEST_F(ShardFolder, PackingChecksWhatItReads) {

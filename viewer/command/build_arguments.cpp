@@ -64,6 +64,7 @@ void addError(CLI::App& app, BuildOptions& options) {
 void addBuildSettings(CLI::App& app, BuildOptions& options, const char* group) {
     const ScopedGroup scope(app, group);
     addCell(app, options.cell);
+    addOrigin(app, options);
     addError(app, options);
     addColourChoice(app, options);
     addImages(app, options);
@@ -92,6 +93,19 @@ void addBuildOutput(CLI::App& app, std::string& output) {
         ->type_name("OUT.vcp")
         ->group(help_group::kOutput)
         ->check([](const std::string& name) { return extensionProblem(name, ".vcp", false); });
+}
+
+void addOrigin(CLI::App& app, BuildOptions& options) {
+    const auto parse = [](const std::string& text) -> std::optional<glm::dvec3> {
+        const auto numbers = parseNumbers(text);
+        return numbers.size() == 3 ? std::optional(glm::dvec3(numbers[0], numbers[1], numbers[2])) : std::nullopt;
+    };
+    addParsed(
+        app, "--origin", options.origin, parse, "three numbers like -10,0,2.5",
+        "Where the grid begins, at least a cell before the mesh: with the same origin and cell, what of a scan stays "
+        "as it was is built as it was (`vcp info` has both) [a cell before the mesh]")
+        ->type_name("X,Y,Z")
+        ->needs("--cell");
 }
 
 void addColourChoice(CLI::App& app, BuildOptions& options) {

@@ -18,6 +18,8 @@ void addBuildSettings(CLI::App& app, BuildOptions& options, const char* group);
 /// Add one of them, or the meshes and the .vcp file, for commands that have not all.
 void addBuildInputs(CLI::App& app, std::vector<std::string>& inputs, const std::string& description);
 void addBuildOutput(CLI::App& app, std::string& output);
+/// Adds --origin, where the grid begins; after --cell.
+void addOrigin(CLI::App& app, BuildOptions& options);
 void addColourChoice(CLI::App& app, BuildOptions& options);
 void addImages(CLI::App& app, BuildOptions& options);
 void addVertexNormals(CLI::App& app, BuildOptions& options);

@@ -107,6 +107,7 @@ Command addBuildPlan(CLI::App& vcp) {
         ->required()
         ->check(CLI::Range(1u, kMostParts));
     addCell(*app, command->settings.cell);
+    addOrigin(*app, command->settings);
     addColourChoice(*app, command->settings);
     addImages(*app, command->settings);
     addVertexNormals(*app, command->settings);

@@ -21,13 +21,9 @@ namespace {
 // first picture does not need, little.
 constexpr uint64_t kFirstOfManifest = 256 << 10, kFirstOfShard = 4 << 10;
 
-/// Opens the file at an address. `firstBytes`: that are asked for at once.
+/// Opens the file at an address, through the cache where one is asked for.
 Result<std::shared_ptr<const ByteReader>> openRemote(const std::string& where, const SourceAccess& access,
-                                                     uint64_t firstBytes) {
-    HttpOptions options;
-    options.firstBytes = firstBytes;
-    options.caFile = access.caFile;
-    options.cancelled = access.cancelled;
+                                                     const HttpOptions& options) {
     VCP_TRY_ASSIGN(auto http, HttpReader::open(where, options));
     if (access.cache.empty()) return std::shared_ptr<const ByteReader>(http);
     VCP_TRY_ASSIGN(auto cached, CachingReader::open(http, http->identity(), access.cache, access.cacheBytes));
@@ -38,14 +34,21 @@ Result<std::shared_ptr<const ByteReader>> openRemote(const std::string& where, c
 
 Result<std::shared_ptr<const ByteReader>> openReader(const std::string& where, const SourceAccess& access) {
     if (!isHttpUrl(where)) return openDatasetFile(where);
-    const bool isNamedSo = where.find(kManifestName) != std::string::npos;
-    VCP_TRY_ASSIGN(const auto file, openRemote(where, access, isNamedSo ? kFirstOfManifest : HttpOptions().firstBytes));
+    HttpOptions options;
+    options.caFile = access.caFile;
+    options.cancelled = access.cancelled;
+    options.connections = sharedConnections();
+    const uint64_t usual = options.firstBytes;
+    if (where.find(kManifestName) != std::string::npos) options.firstBytes = kFirstOfManifest;
+    VCP_TRY_ASSIGN(const auto file, openRemote(where, access, options));
     VCP_TRY_ASSIGN(const bool inShards, isManifest(*file));
     if (!inShards) return file;
-    VCP_TRY_ASSIGN(auto reader, ShardedReader::open(file, [where, access](const ShardRow& shard, bool isFirst) {
-                       return openRemote(addressBeside(where, shardName(shard)), access,
-                                         isFirst ? HttpOptions().firstBytes : kFirstOfShard);
-                   }));
+    const auto openShard = [where, access, options, usual](const ShardRow& shard, bool isFirst) {
+        HttpOptions ofShard = options;
+        ofShard.firstBytes = isFirst ? usual : kFirstOfShard;
+        return openRemote(addressBeside(where, shardName(shard)), access, ofShard);
+    };
+    VCP_TRY_ASSIGN(auto reader, ShardedReader::open(file, openShard));
     return std::shared_ptr<const ByteReader>(reader);
 }
 

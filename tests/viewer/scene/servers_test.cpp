@@ -1,10 +1,13 @@
 // Commands on datasets behind a server: a slow one can be left at once, and nobody is told its password.
+#include <algorithm>
 #include <chrono>
 #include <csignal>
 #include <thread>
 
 #include <gtest/gtest.h>
 
+#include "octree/page_reader.h"
+#include "octree/shard/shard_folder.h"
 #include "streaming/http_reader.h"
 #include "tests/support/range_server.h"
 #include "tests/support/test_files.h"
@@ -73,6 +76,28 @@ TEST_F(Servers, AnOpeningEndsWhenItIsCancelledOrDestroyed) {
         while (!opening.isDone()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
         EXPECT_EQ(opening.take().error().code, ErrorCode::Cancelled);
     }
+}
+
+TEST_F(Servers, ShardsAreReadFromBesideTheirManifest) {
+    const auto whole = *openFile(folder_ / "scan.vcp");
+    const auto written = writeShards(*whole, {.folder = folder_ / "shards", .shardBytes = whole->size() / 6});
+    ASSERT_TRUE(written.ok()) << written.error().line();
+    ASSERT_GT(written->shards, 4u);
+    const auto requests = [&] {
+        const std::string text = logged();
+        return std::count(text.begin(), text.end(), '\n');
+    };
+    const auto reader = openReader(server_->url("shards/manifest.vcps?log=1"), {});
+    ASSERT_TRUE(reader.ok()) << reader.error().line();
+    const auto dataset = readDatasetStart(**reader);
+    ASSERT_TRUE(dataset.ok()) << dataset.error().line();
+    ASSERT_TRUE(readPage(**reader, *dataset, 0, true).ok());
+    EXPECT_LE(requests(), 3) << logged();
+    std::vector<std::byte> bytes(whole->size()), expected(whole->size());
+    ASSERT_TRUE((*reader)->read(0, bytes).ok());
+    ASSERT_TRUE(whole->read(0, expected).ok());
+    EXPECT_TRUE(bytes == expected);
+    EXPECT_GE(requests(), int64_t(written->shards));
 }
 
 TEST_F(Servers, WhatWasOpenedIsReadAfterItsOpeningIsGone) {
