@@ -1,6 +1,6 @@
 // Scans in shards: each shard is a .vcp file that is intact, the one file comes back, and what a change of one part of
 // the scan leaves as it is keeps its shards.
-#include "octree/shard/shard_folder.h"
+#include "streaming/shard/shard_folder.h"
 
 #include <cmath>
 

@@ -1,6 +1,6 @@
 // Datasets in shards: the one file comes back byte for byte, whatever is read of it; opening does not depend on how
 // many shards there are; what is damaged or does not belong together is named.
-#include "octree/shard/sharded_reader.h"
+#include "streaming/shard/sharded_reader.h"
 
 #include <atomic>
 #include <cstring>
@@ -12,7 +12,7 @@
 #include <gtest/gtest.h>
 
 #include "octree/io/content_hash.h"
-#include "octree/shard/shard_folder.h"
+#include "streaming/shard/shard_folder.h"
 #include "streaming/web_address.h"
 #include "tests/support/directory_files.h"
 #include "tests/support/test_folder.h"

@@ -1,7 +1,7 @@
 // vcp info: what is in a .vcp, from its header and directory alone.
 #include <fmt/format.h>
 
-#include "octree/shard/sharded_reader.h"
+#include "streaming/shard/sharded_reader.h"
 #include "viewer/command/commands.h"
 #include "viewer/command/source_arguments.h"
 #include "viewer/command/terminal/interrupt.h"

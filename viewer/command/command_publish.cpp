@@ -2,8 +2,8 @@
 #include <fmt/format.h>
 
 #include "octree/dataset_reader.h"
-#include "octree/shard/shard_folder.h"
 #include "render/host_drawing.h"
+#include "streaming/shard/shard_folder.h"
 #include "viewer/command/commands.h"
 #include "viewer/command/manual/help_text.h"
 #include "viewer/command/site/web_folder.h"

@@ -1,7 +1,7 @@
 // vcp shard and vcp pack: a .vcp file as a folder of files that are uploaded and cached each by itself, and back.
 #include <fmt/format.h>
 
-#include "octree/shard/shard_folder.h"
+#include "streaming/shard/shard_folder.h"
 #include "viewer/command/build_arguments.h"
 #include "viewer/command/commands.h"
 #include "viewer/command/manual/help_text.h"

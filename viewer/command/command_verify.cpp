@@ -5,10 +5,10 @@
 
 #include "builder/measure/surface_distance.h"
 #include "octree/image/image_assembly.h"
-#include "octree/shard/shard_folder.h"
 #include "octree/vcp_verify.h"
 #include "streaming/http_reader.h"
 #include "streaming/read_ahead.h"
+#include "streaming/shard/shard_folder.h"
 #include "viewer/command/build_arguments.h"
 #include "viewer/command/commands.h"
 #include "viewer/command/manual/help_text.h"

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "octree/shard/shard_folder.h"
+#include "streaming/shard/shard_folder.h"
 #include "viewer/command/commands.h"
 
 namespace vcp {

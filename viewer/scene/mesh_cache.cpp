@@ -16,7 +16,7 @@
 #include "octree/io/content_hash.h"
 #include "octree/io/output_file.h"
 #include "octree/io/regular_file.h"
-#include "octree/shard/shard_manifest.h"
+#include "streaming/shard/shard_manifest.h"
 
 namespace vcp {
 

@@ -7,9 +7,9 @@
 #include <glm/geometric.hpp>
 
 #include "octree/io/caught.h"
-#include "octree/shard/shard_folder.h"
 #include "streaming/caching_reader.h"
 #include "streaming/http_reader.h"
+#include "streaming/shard/shard_folder.h"
 #include "streaming/web_address.h"
 #include "viewer/scene/environment.h"
 

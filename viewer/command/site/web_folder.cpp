@@ -16,7 +16,7 @@
 
 #include "octree/io/durable_file.h"
 #include "octree/io/output_folder.h"
-#include "octree/shard/shard_folder.h"
+#include "streaming/shard/shard_folder.h"
 
 namespace vcp {
 

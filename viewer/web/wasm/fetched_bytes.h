@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "octree/io/byte_reader.h"
-#include "octree/shard/sharded_reader.h"
+#include "streaming/shard/sharded_reader.h"
 
 namespace vcp {
 

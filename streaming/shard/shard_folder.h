@@ -8,7 +8,7 @@
 #include "octree/io/byte_reader.h"
 #include "octree/io/output_file.h"
 #include "octree/io/result.h"
-#include "octree/shard/sharded_reader.h"
+#include "streaming/shard/sharded_reader.h"
 
 namespace vcp {
 

@@ -1,4 +1,4 @@
-#include "octree/shard/shard_images.h"
+#include "streaming/shard/shard_images.h"
 
 #include <algorithm>
 

@@ -12,7 +12,7 @@
 
 #include "octree/io/byte_reader.h"
 #include "octree/io/result.h"
-#include "octree/shard/shard_manifest.h"
+#include "streaming/shard/shard_manifest.h"
 
 namespace vcp {
 

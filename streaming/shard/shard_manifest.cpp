@@ -1,4 +1,4 @@
-#include "octree/shard/shard_manifest.h"
+#include "streaming/shard/shard_manifest.h"
 
 #include <algorithm>
 #include <bit>

@@ -1,4 +1,4 @@
-#include "octree/shard/shard_split.h"
+#include "streaming/shard/shard_split.h"
 
 #include <algorithm>
 

@@ -1,4 +1,4 @@
-#include "octree/shard/shard_folder.h"
+#include "streaming/shard/shard_folder.h"
 
 #include <algorithm>
 #include <numeric>
@@ -12,12 +12,12 @@
 #include "octree/io/content_hash.h"
 #include "octree/io/durable_file.h"
 #include "octree/io/output_folder.h"
-#include "octree/shard/shard_images.h"
-#include "octree/shard/shard_manifest.h"
-#include "octree/shard/shard_split.h"
 #include "octree/surface/morton.h"
 #include "octree/vcp_verify.h"
 #include "octree/vcp_writer.h"
+#include "streaming/shard/shard_images.h"
+#include "streaming/shard/shard_manifest.h"
+#include "streaming/shard/shard_split.h"
 
 namespace vcp {
 

@@ -1,4 +1,4 @@
-#include "octree/shard/sharded_reader.h"
+#include "streaming/shard/sharded_reader.h"
 
 #include <algorithm>
 #include <cstdlib>
