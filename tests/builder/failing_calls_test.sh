@@ -21,7 +21,7 @@ awk 'BEGIN {
         print "f", a + 1, b + 1, c + 1; print "f", a + 1, c + 1, d + 1;
     }
 }' >ring.obj
-build=("$vcp" build ring.obj --cell 0.1 --memory 200M --threads 2 --temp temp --checkpoint 0 --progress none -o out.vcp)
+build=("$vcp" build "$work/ring.obj" --cell 0.1 --memory 200M --threads 2 --temp temp --checkpoint 0 --progress none -o out.vcp)
 "${build[@]}" >/dev/null
 mv out.vcp whole.vcp
 
@@ -30,44 +30,52 @@ LD_PRELOAD=$library FAIL_SHORT=1 "${build[@]}" >/dev/null
 cmp whole.vcp out.vcp || fail "short writes give other bytes"
 rm out.vcp
 
-# sweep STEP ERRNO_OF_ODD ERRNO_OF_EVEN [ON]: fails the first call, then the one STEP later, ...; with ON all
-# calls after it, too.
+# sweep FIRST STEP ERRNO [ON]: fails one call, then the one STEP later, ...; with ON all calls after it, too. In a folder
+# of its own.
 sweep() {
-    local n status error
+    local n status
     local -a on=()
     if [ $# -gt 3 ]; then on=(FAIL_ON=1); fi
-    for ((n = 1; ; n += $1)); do
-        error=$2
-        if [ $((n % 2)) -eq 0 ]; then error=$3; fi
+    mkdir -p "$work/sweep$1-$2/temp"
+    cd "$work/sweep$1-$2"
+    for ((n = $1; ; n += $2)); do
         rm -f failed
         status=0
-        env LD_PRELOAD="$library" FAIL_AT=$n FAIL_ERRNO="$error" FAIL_MARK=failed ${on[@]+"${on[@]}"} "${build[@]}" >/dev/null 2>err.txt || status=$?
+        env LD_PRELOAD="$library" FAIL_AT=$n FAIL_ERRNO="$3" FAIL_MARK=failed ${on[@]+"${on[@]}"} "${build[@]}" >/dev/null 2>err.txt || status=$?
         if [ ! -e failed ]; then
             [ "$status" -eq 0 ] || fail "call $n: nothing failed, but the exit status is $status: $(cat err.txt)"
-            cmp whole.vcp out.vcp || fail "call $n: other bytes"
+            cmp "$work/whole.vcp" out.vcp || fail "call $n: other bytes"
             rm out.vcp
             break
         fi
-        [ "$status" -eq 1 ] || fail "call $n, error $error: exit status $status: $(cat err.txt)"
-        [ "$(wc -l <err.txt)" -eq 1 ] || fail "call $n, error $error: $(wc -l <err.txt) lines: $(cat err.txt)"
-        grep -Eq 'No space left on device|Input/output error' err.txt || fail "call $n, error $error does not say why: $(cat err.txt)"
-        grep -Eq '^vcp: (out\.vcp|temp|\.)' err.txt || fail "call $n, error $error does not say where: $(cat err.txt)"
+        [ "$status" -eq 1 ] || fail "call $n, error $3: exit status $status: $(cat err.txt)"
+        [ "$(wc -l <err.txt)" -eq 1 ] || fail "call $n, error $3: $(wc -l <err.txt) lines: $(cat err.txt)"
+        grep -Eq 'No space left on device|Input/output error' err.txt || fail "call $n, error $3 does not say why: $(cat err.txt)"
+        grep -Eq '^vcp: (out\.vcp|temp|\.)' err.txt || fail "call $n, error $3 does not say where: $(cat err.txt)"
         if [ -e out.vcp ]; then
             # Only its name's durability may be in doubt.
-            cmp whole.vcp out.vcp || fail "call $n, error $error left a wrong file"
-            grep -q "is complete" err.txt || fail "call $n, error $error left a file: $(cat err.txt)"
+            cmp "$work/whole.vcp" out.vcp || fail "call $n, error $3 left a wrong file"
+            grep -q "is complete" err.txt || fail "call $n, error $3 left a file: $(cat err.txt)"
         fi
-        [ ! -e out.vcp.partial ] || fail "call $n, error $error left out.vcp.partial"
+        [ ! -e out.vcp.partial ] || fail "call $n, error $3 left out.vcp.partial"
         # What is kept is said.
-        if [ -n "$(ls -A temp)" ] && [ ! -e out.vcp ]; then grep -q -- "--resume" err.txt || fail "call $n, error $error left $(find temp) and does not say so: $(cat err.txt)"; fi
-        "${build[@]}" --resume >/dev/null 2>err.txt || fail "after call $n, error $error: --resume: $(cat err.txt)"
-        cmp whole.vcp out.vcp || fail "after call $n, error $error the file differs"
-        [ -z "$(ls -A temp)" ] || fail "after call $n, error $error $(ls -A temp) is left"
+        if [ -n "$(ls -A temp)" ] && [ ! -e out.vcp ]; then grep -q -- "--resume" err.txt || fail "call $n, error $3 left $(find temp) and does not say so: $(cat err.txt)"; fi
+        "${build[@]}" --resume >/dev/null 2>err.txt || fail "after call $n, error $3: --resume: $(cat err.txt)"
+        cmp "$work/whole.vcp" out.vcp || fail "after call $n, error $3 the file differs"
+        [ -z "$(ls -A temp)" ] || fail "after call $n, error $3 $(ls -A temp) is left"
         rm out.vcp
     done
     [ "$n" -gt 30 ] || fail "only $n calls were counted"
-    echo "$(((n + $1 - 2) / $1)) calls failed"
+    echo "$(((n - $1) / $2)) calls failed"
 }
+# Every call once, and every third with all after it. The disk is what is waited for, so they run side by side.
 enospc=28 eio=5
-sweep 1 $enospc $eio
-sweep 3 $eio $enospc on
+sweeps=()
+for each in "1 2 $enospc" "2 2 $eio" "1 6 $eio on" "4 6 $enospc on"; do
+    read -ra each <<<"$each"
+    sweep "${each[@]}" &
+    sweeps+=($!)
+done
+status=0
+for each in "${sweeps[@]}"; do wait "$each" || status=1; done
+exit "$status"

@@ -142,13 +142,13 @@ TEST_F(ViewerTest, APictureThatStaysGetsItsSamplesAndThenNothingIsDrawn) {
 
 TEST_F(ViewerTest, InputInterruptsSamplesAtOnce) {
     for (const bool framesAhead : {false, true}) {
-        openViewer(50, *folder_ / "ball.vcp", 0, framesAhead, kMostSamples);
+        openViewer(50, *folder_ / "ball.vcp", 0, framesAhead, kUsualSamples);
         settle();
         viewer_->act(ViewerAction::ToggleShadows);
         for (int i = 0; i < 10; ++i) EXPECT_TRUE(turn(0.1));
         const uint32_t samples = viewer_->status().samples;
         EXPECT_GT(samples, 2u);
-        EXPECT_LT(samples, kMostSamples);
+        EXPECT_LT(samples, kUsualSamples);
         viewer_->press(MouseButton::Left, {160, 120});
         viewer_->move({170, 120});
         EXPECT_TRUE(turn(0.01));
@@ -162,7 +162,7 @@ TEST_F(ViewerTest, InputInterruptsSamplesAtOnce) {
         EXPECT_LE(next_.waitSeconds, 0.15);
         EXPECT_TRUE(turn(0.2));
         settle();
-        EXPECT_EQ(viewer_->status().samples, kMostSamples);
+        EXPECT_EQ(viewer_->status().samples, kUsualSamples);
     }
 }
 

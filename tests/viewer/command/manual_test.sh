@@ -42,13 +42,15 @@ mapfile -t paths < <(commandsOf vcp)
 
 # Each command has a page, which names each option and each command below.
 "$vcp" man --all pages
+declare -A options
 for path in "${paths[@]}"; do
+    options[$path]=$(optionsOf "$path")
     page=pages/${path// /-}.1
     [ -s "$page" ] || fail "there is no $page"
-    plain=$(sed 's/\\fB\|\\fI\|\\fR//g; s/\\-/-/g' "$page")
-    for option in $(optionsOf "$path"); do
-        grep -E -- "(^|, )$option(,| |\$)" <<<"$plain" >/dev/null || fail "$page does not name $option"
-    done
+    # Names begin a line or follow a comma.
+    named=$(sed 's/\\fB\|\\fI\|\\fR//g; s/\\-/-/g; s/, /\n/g' "$page" | sed 's/[, ].*//' | sort -u)
+    missing=$(comm -23 <(echo "${options[$path]}") <(echo "$named"))
+    [ -z "$missing" ] || fail "$page does not name $missing"
 done
 read -ra words <<<"${paths[1]}"
 cmp <("$vcp" man "${words[@]:1}") "pages/${paths[1]// /-}.1" || fail "vcp man prints another page"
@@ -87,8 +89,8 @@ cd ..
 grep -x render <<<"$(offered vcp help '')" >/dev/null || fail "bash does not offer commands to help"
 for path in "${paths[@]}"; do
     read -ra words <<<"$path"
-    all=$(offered "${words[@]}" -)
-    for option in $(optionsOf "$path"); do grep -x -- "$option" <<<"$all" >/dev/null || fail "bash does not offer $option to $path"; done
+    missing=$(comm -23 <(echo "${options[$path]}") <(offered "${words[@]}" -))
+    [ -z "$missing" ] || fail "bash does not offer $missing to $path"
 done
 
 # zsh and fish read their scripts, where they are installed.
