@@ -99,6 +99,8 @@ void addRenderSettings(CLI::App& app, RenderSettings& settings) {
         "to a pixel), steps, cells, fetches (work of each ray)")
         ->type_name(fmt::format("MODE:{{{}}}", fmt::join(kShadingNames, ",")))
         ->default_str("lit");
+    app.add_flag("!--plain", settings.shading.channels,
+                 "Plain light on all colours, where materials have normals, roughness, metalness or emission, too");
     app.add_flag("--shadows", settings.shading.shadows, "Light casts hard shadows");
     app.add_option("--occlusion", settings.shading.occlusionRays,
                    "Corners and folds are darker (ambient occlusion), by so many rays a pixel; 8 without N [off]")
