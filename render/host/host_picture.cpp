@@ -235,16 +235,12 @@ HostPicture::HostPicture(glm::ivec2 pictureSize, std::span<const uint32_t> backg
 }
 
 void SampledLight::add(std::span<const uint32_t> colours, size_t first) {
-    static const std::array<float, 256> kLight = [] {
-        std::array<float, 256> light;
-        for (size_t i = 0; i < light.size(); ++i) light[i] = f32::lightOfColour(glm::vec3(float(i) / 255)).x;
-        return light;
-    }();
+    const std::array<float, 256>& light = lightOfColourBytes();
     for (size_t i = 0; i < colours.size(); ++i) {
         const uint32_t c = colours[i];
         const float alpha = float(c >> 24) / 255;
         sums_[first + i] +=
-            glm::vec4(glm::vec3(kLight[c & 255], kLight[c >> 8 & 255], kLight[c >> 16 & 255]) * alpha, alpha);
+            glm::vec4(glm::vec3(light[c & 255], light[c >> 8 & 255], light[c >> 16 & 255]) * alpha, alpha);
     }
     if (first + colours.size() == sums_.size()) ++samples_;
 }

@@ -1,5 +1,6 @@
 #include "render/host/tile_channels.h"
 
+#include <array>
 #include <cmath>
 #include <optional>
 
@@ -123,8 +124,10 @@ std::vector<PixelChannels> findChannels(const HostScene& scene, const PictureRay
 
 void shadeChannels(const frame::FrameConstants& frame, const TileSurface& surface,
                    const std::vector<PixelChannels>& channels, uint32_t (&colours)[kTilePixels]) {
+    const std::array<float, 256>& lightOf = lightOfColourBytes();
     for (const auto& [i, hit] : channels) {
-        const glm::vec3 albedo = f32::lightOfColour(glm::vec3(surface.red[i], surface.green[i], surface.blue[i]));
+        const uint32_t colour = packedColour({surface.red[i], surface.green[i], surface.blue[i], 1});
+        const glm::vec3 albedo(lightOf[colour & 255u], lightOf[colour >> 8 & 255u], lightOf[colour >> 16 & 255u]);
         const f32::LitSurface lit{albedo, hit.roughness, hit.metalness, hit.emission};
         const glm::vec3 light = lightFrom(frame, lit, hit, surface.sun[i], surface.sky[i]);
         colours[i] = packedColour(glm::vec4(f32::colourOfLight(light), 1));
