@@ -373,7 +373,7 @@ private:
 
     /// Whether there are images to keep, as far as is known before they are read.
     [[nodiscard]] bool mayKeepImages() const {
-        const auto hasImage = [](const Material& material) { return material.image.exists(); };
+        const auto hasImage = [](const Material& material) { return material.hasImages(); };
         return keepsImages(options_) && colourUse().materials && std::ranges::any_of(files_.soup->materials, hasImage);
     }
 

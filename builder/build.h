@@ -84,6 +84,7 @@ struct BuildOptions {
     /// colours at vertices stay. Nothing: where the finest level is the mesh.
     std::optional<bool> keepImages;
     ImageQuality imageQuality;
+    bool channels = true;  ///< with the images: what materials have beside their colour (MaterialChannels)
     VertexNormals vertexNormals = VertexNormals::Mesh;
     bool masks = true;  ///< what the alpha of materials leaves out is no surface (MaskRule); false: it is
     /// Is given what is read, for a picture meanwhile (mesh_sample.h); nothing where work is resumed. May be empty.

@@ -14,7 +14,7 @@ namespace {
 using nlohmann::json;
 
 // Version of the temporary files; a build does not continue from another version's.
-constexpr int kTempVersion = 16;
+constexpr int kTempVersion = 17;
 
 json jsonOf(glm::dvec3 v) { return {v.x, v.y, v.z}; }
 
@@ -196,10 +196,11 @@ Result<void> reopenSpools(std::deque<PageSpool>& spools, const SpoolLengths& len
 std::string settingsText(const BuildOptions& options) {
     // How images are coded matters where some are kept.
     const ImageQuality quality = keepsImages(options) ? options.imageQuality : ImageQuality();
-    std::string text = fmt::format("{} {:a} {:a} {} {} {} {} {} {} {} {} {}", kFileVersion, options.cell, options.error,
-                                   options.errorIsRelative, int(options.colour), int(options.coarseLeaves),
-                                   keepsImages(options), quality.finest.value_or(-1), quality.coarser.value_or(-1),
-                                   int(options.vertexNormals), options.masks, options.format);
+    std::string text =
+        fmt::format("{} {:a} {:a} {} {} {} {} {} {} {} {} {} {}", kFileVersion, options.cell, options.error,
+                    options.errorIsRelative, int(options.colour), int(options.coarseLeaves), keepsImages(options),
+                    quality.finest.value_or(-1), quality.coarser.value_or(-1), int(options.vertexNormals),
+                    options.masks, options.channels, options.format);
     if (options.origin) text += fmt::format(" {:a} {:a} {:a}", options.origin->x, options.origin->y, options.origin->z);
     return text;
 }

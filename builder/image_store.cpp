@@ -36,14 +36,58 @@ constexpr double kStoredOfJpeg = 1.5, kStoredOfPng = 0.9;
 // Time to read and code what becomes a byte of the file, on two cores.
 constexpr double kSecondsOfByte = 0.3e-6;
 
-/// Names an image by where it comes from, and what its alpha or its mask does: it is decoded once for all materials
-/// that have it.
+/// An image of a material that the file keeps.
+struct KeptImage {
+    Material material;  ///< that has it as its colour, if only for this
+    TexelKind kind = TexelKind::Colours;
+    bool isChannel = false;  ///< nobody else reads it, and says that it cannot be read
+};
+
+// A PNG of one white texel.
+constexpr unsigned char kWhitePng[] = {
+    0x89, 0x50, 0x4e, 0x47, 0x0d, 0x0a, 0x1a, 0x0a, 0x00, 0x00, 0x00, 0x0d, 0x49, 0x48, 0x44, 0x52, 0x00,
+    0x00, 0x00, 0x01, 0x00, 0x00, 0x00, 0x01, 0x08, 0x00, 0x00, 0x00, 0x00, 0x3a, 0x7e, 0x9b, 0x55, 0x00,
+    0x00, 0x00, 0x0a, 0x49, 0x44, 0x41, 0x54, 0x78, 0x9c, 0x63, 0xf8, 0x0f, 0x00, 0x01, 0x01, 0x01, 0x00,
+    0xb1, 0x38, 0xf6, 0x14, 0x00, 0x00, 0x00, 0x00, 0x49, 0x45, 0x4e, 0x44, 0xae, 0x42, 0x60, 0x82,
+};
+
+/// Returns the image of a material's colour: a white one where only its channels have images.
+KeptImage colourOf(const Material& material) {
+    static const auto white = std::make_shared<const std::string>(std::begin(kWhitePng), std::end(kWhitePng));
+    KeptImage kept{.material = material};
+    if (!material.image.exists()) kept.material.image.bytes = white;
+    return kept;
+}
+
+/// Returns the image of a channel, all of it opaque.
+KeptImage channelOf(const ImageSource& image, TexelKind kind) {
+    Material material;
+    material.image = image;
+    material.ignoresAlpha = true;
+    return {material, kind, true};
+}
+
+/// Returns all images that the file keeps of a material.
+std::vector<KeptImage> imagesOf(const Material& material) {
+    std::vector<KeptImage> images;
+    if (!material.hasImages()) return images;
+    images.push_back(colourOf(material));
+    const MaterialChannels& channels = material.channels;
+    if (channels.normals.exists()) images.push_back(channelOf(channels.normals, TexelKind::Numbers));
+    if (channels.surface.exists()) images.push_back(channelOf(channels.surface, TexelKind::Numbers));
+    if (channels.emission.exists()) images.push_back(channelOf(channels.emission, TexelKind::Colours));
+    return images;
+}
+
+/// Names an image by where it comes from, what its alpha or its mask does, and how it is averaged: it is decoded once
+/// for all materials that have it.
 using SourceKey = std::pair<std::filesystem::path, const std::string*>;
-using ImageKey = std::tuple<SourceKey, bool, bool, SourceKey>;
+using ImageKey = std::tuple<SourceKey, bool, bool, SourceKey, TexelKind>;
 SourceKey keyOf(const ImageSource& source) { return {source.path, source.bytes.get()}; }
-ImageKey keyOf(const Material& material) {
+ImageKey keyOf(const KeptImage& image) {
+    const Material& material = image.material;
     return {keyOf(material.image), material.ignoresAlpha, material.isCutOut,
-            material.isCutOut && material.ignoresAlpha ? keyOf(material.mask.image) : SourceKey()};
+            material.isCutOut && material.ignoresAlpha ? keyOf(material.mask.image) : SourceKey(), image.kind};
 }
 
 ImageWrap storedWrap(Wrap wrap) {
@@ -83,8 +127,9 @@ std::vector<std::byte> packed(std::span<const Rgba8> rows, const ImageLevel& lev
 class CodedImage {
 public:
     /// `work`: where tiles are kept in the order they are made in.
-    CodedImage(ImageRows& image, uint64_t firstTile, const ImageQuality& quality, PageSpool& work)
+    CodedImage(ImageRows& image, TexelKind kind, uint64_t firstTile, const ImageQuality& quality, PageSpool& work)
         : image_(image),
+          kind_(kind),
           quality_(quality),
           levels_(imageLevels(image.size().x, image.size().y, firstTile, kLargeTileEdge)),
           work_(work),
@@ -92,8 +137,9 @@ public:
 
     [[nodiscard]] const std::vector<ImageLevel>& levels() const { return levels_; }
 
-    /// Reads the image, and codes its tiles. Returns whether it could be read. Errors: Io, Cancelled.
-    Result<bool> code(const std::function<bool(double)>& progress) {
+    /// Reads the image, and codes its tiles. Returns why it cannot be read; nothing where it was. Errors: Io,
+    /// Cancelled.
+    Result<std::optional<Error>> code(const std::function<bool(double)>& progress) {
         Result<void> coded;
         const auto take = [&](size_t level, uint32_t firstRow, std::span<const Rgba8> rows) -> Result<void> {
             if (level == 0 && !progress(double(firstRow) / double(levels_[0].height)))
@@ -102,9 +148,9 @@ public:
                 coded = codeRow(level, firstRow / kLargeTileEdge, rows);
             return coded;
         };
-        const auto read = readLevels(image_, take);
+        const auto read = readLevels(image_, take, kind_);
         if (!coded) return coded.error();
-        return read.ok();
+        return read ? std::optional<Error>() : std::optional(read.error());
     }
 
     /// Appends the tiles to what the file will have, coarse levels first. Errors: Io, InvalidInput (damaged).
@@ -144,6 +190,7 @@ private:
     }
 
     ImageRows& image_;
+    const TexelKind kind_;
     const ImageQuality& quality_;
     std::vector<ImageLevel> levels_;
     PageSpool& work_;
@@ -174,25 +221,69 @@ struct ImageStore {
 
     /// Codes an image whose first tile has that number. Returns its row in the tables; nothing where it is left out.
     /// Errors: as storeImages().
-    [[nodiscard]] Result<std::optional<ImageRow>> add(const Material& material, uint64_t firstTile,
+    [[nodiscard]] Result<std::optional<ImageRow>> add(const KeptImage& kept, uint64_t firstTile,
                                                       const std::function<bool(double)>& progress) const {
         if (!progress(0)) return Error::cancelled();
-        const auto opened = openImage(material);
-        if (!opened) return std::optional<ImageRow>();
-        if (const auto tooLarge = tooLargeFor(imageBytes, material.image, **opened)) {
+        const auto opened = openImage(kept.material);
+        if (!opened) return leaveOut(kept, opened.error());
+        if (const auto tooLarge = tooLargeFor(imageBytes, kept.material.image, **opened)) {
             if (options.keepImages) return *tooLarge;
             warnings.push_back(tooLarge->line() + "; it is left out");
             return std::optional<ImageRow>();
         }
-        CodedImage image(**opened, firstTile, options.imageQuality, work);
-        VCP_TRY_ASSIGN(const bool isCoded, image.code(progress));
-        if (isCoded) VCP_TRY(image.appendTo(spool));
+        CodedImage image(**opened, kept.kind, firstTile, options.imageQuality, work);
+        VCP_TRY_ASSIGN(const auto unread, image.code(progress));
+        if (!unread) VCP_TRY(image.appendTo(spool));
         work.remove();
-        if (!isCoded) return std::optional<ImageRow>();
+        if (unread) return leaveOut(kept, namedImageError(kept.material.image, *unread));
         const glm::uvec2 size = (*opened)->size();
         return std::optional(ImageRow{size.x, size.y, uint32_t(image.levels().size()), kMixedTiles, firstTile});
     }
+
+private:
+    [[nodiscard]] std::optional<ImageRow> leaveOut(const KeptImage& kept, const Error& error) const {
+        if (kept.isChannel) warnings.push_back(error.line() + "; its material does without");
+        return {};
+    }
 };
+
+/// Returns the row of a material's channels; none where they have no image that can be read, and do not shine.
+/// `numberOf`: returns an image's number in the file, or nothing where it cannot be read.
+template <class NumberOf>
+Result<ChannelRow> storedChannels(MaterialChannels channels, const NumberOf& numberOf) {
+    ChannelRow row;
+    const auto keep = [&](const ImageSource& image, TexelKind kind, uint32_t& to) -> Result<bool> {
+        if (!image.exists()) return true;
+        VCP_TRY_ASSIGN(const auto number, numberOf(channelOf(image, kind)));
+        if (number) to = *number + 1;
+        return number.has_value();
+    };
+    VCP_TRY_ASSIGN(const bool hasNormals, keep(channels.normals, TexelKind::Numbers, row.normals));
+    VCP_TRY_ASSIGN(const bool hasSurface, keep(channels.surface, TexelKind::Numbers, row.surface));
+    VCP_TRY_ASSIGN(const bool hasEmission, keep(channels.emission, TexelKind::Colours, row.emission));
+    if (!hasNormals) channels.forgetNormals();
+    if (!hasSurface) channels.forgetSurface();
+    if (!hasEmission) channels.forgetEmission();
+    if (!channels.exist()) return ChannelRow();
+    row.isGiven = 1;
+    row.normalScale = channels.normalScale;
+    row.roughness = channels.roughness;
+    row.metalness = channels.metalness;
+    for (int i = 0; i < 3; ++i) row.emissionFactor[i] = channels.emissionFactor[i];
+    return row;
+}
+
+/// Returns by how many bits the coordinates of the last material may be coarser than steps: so that they still tell
+/// apart what is between the texels of all its images.
+uint32_t stepsAside(const ImageTables& tables) {
+    uint32_t edge = 1;
+    const auto widen = [&](uint32_t image) {
+        edge = std::max({edge, tables.images[image].width, tables.images[image].height});
+    };
+    forEachImage(tables, uint32_t(tables.materials.size() - 1), widen);
+    const uint32_t bits = uint32_t(std::bit_width(edge - 1)) + kBitsBelowTexels;
+    return uint32_t(-kLog2TextureUnit) - std::min(bits, uint32_t(-kLog2TextureUnit));
+}
 
 }  // namespace
 
@@ -207,29 +298,32 @@ Result<std::vector<PlacedMaterial>> storeImages(std::span<const Material> materi
     PageSpool work(space, 0, "tile");
     const ImageStore store{options, imageBytes, work, spool, warnings};
     for (size_t i = 0; i < materials.size(); ++i) {
-        const Material& material = materials[i];
-        if (!material.image.exists()) continue;
-        const auto [number, isNew] = numbers.try_emplace(keyOf(material));
-        if (isNew) {
+        const auto numberOf = [&](const KeptImage& kept) -> Result<std::optional<uint32_t>> {
+            const auto [number, isNew] = numbers.try_emplace(keyOf(kept));
+            if (!isNew) return number->second;
             const auto part = [&](double done) { return progress((double(i) + done) / double(materials.size())); };
-            VCP_TRY_ASSIGN(const auto row, store.add(material, tiles, part));
-            if (row) {
-                number->second = uint32_t(tables.images.size());
-                tables.images.push_back(*row);
-                tiles += tilesOf(levelsOf(*row));
-            }
-        }
-        if (!number->second) continue;
-        const ImageRow& image = tables.images[*number->second];
-        const uint32_t bits = uint32_t(std::bit_width(std::max(image.width, image.height) - 1)) + kBitsBelowTexels;
-        tables.materials.push_back(
-            {*number->second, material.factor, storedWrap(material.wrapU), storedWrap(material.wrapV)});
-        placed[i] = {uint32_t(tables.materials.size()),
-                     uint32_t(-kLog2TextureUnit) - std::min(bits, uint32_t(-kLog2TextureUnit))};
+            VCP_TRY_ASSIGN(const auto row, store.add(kept, tiles, part));
+            if (!row) return number->second;
+            number->second = uint32_t(tables.images.size());
+            tables.images.push_back(*row);
+            tiles += tilesOf(levelsOf(*row));
+            return number->second;
+        };
+        const Material& material = materials[i];
+        if (!material.hasImages()) continue;
+        VCP_TRY_ASSIGN(const auto number, numberOf(colourOf(material)));
+        if (!number) continue;
+        tables.materials.push_back({*number, material.factor, storedWrap(material.wrapU), storedWrap(material.wrapV)});
+        VCP_TRY_ASSIGN(const auto channels, storedChannels(material.channels, numberOf));
+        tables.channels.push_back(channels);
+        placed[i] = {uint32_t(tables.materials.size()), stepsAside(tables)};
     }
     if (tables.images.empty()) return std::vector<PlacedMaterial>();
+    const auto isGiven = [](const ChannelRow& row) { return row.isGiven != 0; };
+    if (std::none_of(tables.channels.begin(), tables.channels.end(), isGiven)) tables.channels.clear();
     // The numbers of rows stand before them.
-    const uint32_t counts[2] = {uint32_t(tables.images.size()), uint32_t(tables.materials.size())};
+    const uint32_t counts[3] = {uint32_t(tables.images.size()), uint32_t(tables.materials.size()),
+                                uint32_t(tables.channels.size())};
     StoredPage stored{.geometry = tables.stored(), .colour = {}};
     const auto first = std::as_bytes(std::span(counts));
     stored.geometry.insert(stored.geometry.begin(), first.begin(), first.end());
@@ -239,15 +333,14 @@ Result<std::vector<PlacedMaterial>> storeImages(std::span<const Material> materi
 
 uint64_t expectedImageBytes(std::span<const Material> materials) {
     std::map<ImageKey, double> bytes;
-    for (const Material& material : materials) {
-        if (!material.image.exists()) continue;
-        std::error_code missing;
-        const auto size = material.image.bytes ? material.image.bytes->size()
-                                               : std::filesystem::file_size(material.image.path, missing);
-        const bool isPng = material.image.bytes ? material.image.bytes->starts_with("\x89PNG")
-                                                : material.image.path.extension() == ".png";
-        bytes[keyOf(material)] = missing ? 0 : (isPng ? kStoredOfPng : kStoredOfJpeg) * double(size);
-    }
+    for (const Material& material : materials)
+        for (const KeptImage& kept : imagesOf(material)) {
+            const ImageSource& image = kept.material.image;
+            std::error_code missing;
+            const auto size = image.bytes ? image.bytes->size() : std::filesystem::file_size(image.path, missing);
+            const bool isPng = image.bytes ? image.bytes->starts_with("\x89PNG") : image.path.extension() == ".png";
+            bytes[keyOf(kept)] = missing ? 0 : (isPng ? kStoredOfPng : kStoredOfJpeg) * double(size);
+        }
     return uint64_t(std::accumulate(bytes.begin(), bytes.end(), 0.0,
                                     [](double sum, const auto& image) { return sum + image.second; }));
 }
@@ -255,13 +348,15 @@ uint64_t expectedImageBytes(std::span<const Material> materials) {
 uint64_t expectedImageMemory(std::span<const Material> materials, uint64_t textureBytes) {
     std::set<ImageKey> known;
     uint64_t rows = 0, textures = 0;
-    for (const Material& material : materials) {
-        if (!material.image.exists() || !known.insert(keyOf(material)).second) continue;
-        const auto image = openImage(material);
-        if (!image) continue;
-        rows = std::max(rows, memoryFor(**image));
-        textures += Texture::bytesOf((*image)->size());
-    }
+    for (const Material& material : materials)
+        for (const KeptImage& kept : imagesOf(material)) {
+            if (!known.insert(keyOf(kept)).second) continue;
+            const auto image = openImage(kept.material);
+            if (!image) continue;
+            rows = std::max(rows, memoryFor(**image));
+            // Colours at vertices come from the image of the colour alone.
+            if (keyOf(kept.material.image) == keyOf(material.image)) textures += Texture::bytesOf((*image)->size());
+        }
     return rows + std::min(textures, textureBytes);
 }
 
@@ -272,13 +367,18 @@ Result<ImageTables> storedTables(const PageSpool& spool) {
     if (spool.entries().empty()) return tables;
     const std::span tiles = std::span(spool.entries()).first(spool.entries().size() - 1);
     VCP_TRY_ASSIGN(const auto stored, spool.read(spool.entries().back()));
-    uint32_t counts[2];
+    uint32_t counts[3];
     std::memcpy(counts, stored.geometry.data(), sizeof counts);
     tables.images.resize(counts[0]);
     tables.materials.resize(counts[1]);
-    const std::byte* const rows = stored.geometry.data() + sizeof counts;
-    std::memcpy(tables.images.data(), rows, counts[0] * sizeof(ImageRow));
-    std::memcpy(tables.materials.data(), rows + counts[0] * sizeof(ImageRow), counts[1] * sizeof(MaterialRow));
+    tables.channels.resize(counts[2]);
+    const std::byte* rows = stored.geometry.data() + sizeof counts;
+    const auto take = [&rows](auto& table) {
+        const size_t bytes = std::as_bytes(std::span(table)).size();
+        if (bytes > 0) std::memcpy(table.data(), rows, bytes);
+        rows += bytes;
+    };
+    take(tables.images), take(tables.materials), take(tables.channels);
     for (const PageEntry& tile : tiles) tables.tiles.push_back({0, tile.hash, tile.storedBytes, 0});
     return tables;
 }

@@ -16,13 +16,14 @@
 
 namespace vcp {
 
-/// Codes the images of `materials`, each once however many have it, as options.imageQuality says, and appends their
-/// tiles to `spool`, then their tables. A tile that is not opaque, or has fewer bytes without loss, loses nothing. Each
-/// image is read from the top; its tiles wait in a temporary file of `space` until it was read to its end. Images that
-/// cannot be read are left out; whoever takes colours from them says so. `imageBytes`: memory for one image's rows, and
-/// for the whole of what cannot be read by rows; one that needs more becomes a warning, and is left out, too, unless
-/// images are asked for. `progress` is given the part done, row by row of tiles; false cancels. Returns what the file
-/// has of each material. Uses the calling arena's threads. Errors: Limit (an image needs more memory), Io, Cancelled.
+/// Codes the images of `materials`, and of their channels, each once however many have it, as options.imageQuality
+/// says, and appends their tiles to `spool`, then their tables. A tile that is not opaque, or has fewer bytes without
+/// loss, loses nothing. Each image is read from the top; its tiles wait in a temporary file of `space` until it was
+/// read to its end. Images that cannot be read are left out: of channels that becomes a warning; whoever takes colours
+/// from the others says so. `imageBytes`: memory for one image's rows, and for the whole of what cannot be read by
+/// rows; one that needs more becomes a warning, and is left out, too, unless images are asked for. `progress` is given
+/// the part done, row by row of tiles; false cancels. Returns what the file has of each material. Uses the calling
+/// arena's threads. Errors: Limit (an image needs more memory), Io, Cancelled.
 Result<std::vector<PlacedMaterial>> storeImages(std::span<const Material> materials, const BuildOptions& options,
                                                 uint64_t imageBytes, TempSpace& space, PageSpool& spool,
                                                 std::vector<std::string>& warnings,

@@ -213,6 +213,7 @@ Result<SoupMeasures> readInputs(const BuildOptions& options, TempSpace& space, u
         if (isPainted) {
             for (const Material& material : stream->materials()) {
                 soup.materials.push_back(material);
+                if (!options.channels) soup.materials.back().channels = {};
                 soup.materials.back().isCutOut = hasMasks && material.mask.image.exists();
             }
         }
@@ -233,7 +234,7 @@ Result<SoupMeasures> readInputs(const BuildOptions& options, TempSpace& space, u
     m.cutTriangles = cutTriangles;
     m.hasVertexColours = hasVertexColours;
     m.hasMaterials = std::any_of(soup.materials.begin(), soup.materials.end(), [](const Material& material) {
-        return material.factor != kWhite || material.image.exists();
+        return material.factor != kWhite || material.hasImages();
     });
     if (m.triangles == 0)
         return badInput(options, cutTriangles > 0 ? "has no triangles but those that masks cut out; keep them whole"

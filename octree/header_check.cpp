@@ -76,14 +76,17 @@ private:
         const uint32_t unknown =
             h_.flags & ~(kFlagColour | (h_.version > 3 ? kFlagCovering : 0) | (h_.version > 5 ? kFlagParts : 0) |
                          (h_.version >= kMarkedFileVersion ? kFlagMarks : 0) |
-                         (h_.version >= kImagesFileVersion ? kFlagImages : 0));
+                         (h_.version >= kImagesFileVersion ? kFlagImages : 0) |
+                         (h_.version >= kChannelsFileVersion ? kFlagChannels : 0));
         if (unknown != 0)
             return fail(offsetof(FileHeader, flags),
                         fmt::format("flags {:#x} are not known to this program: use a newer program", unknown),
                         ErrorCode::Unsupported);
         // Each version above the usual one is of files that have what it is for.
         const auto has = [this](uint32_t flags) { return (h_.flags & flags) == flags; };
-        const bool isAskedFor = h_.version == kImagesFileVersion   ? has(kFlagColour | kFlagParts | kFlagImages)
+        constexpr uint32_t kWithImages = kFlagColour | kFlagParts | kFlagImages;
+        const bool isAskedFor = h_.version == kChannelsFileVersion ? has(kWithImages | kFlagChannels)
+                                : h_.version == kImagesFileVersion ? has(kWithImages)
                                 : h_.version == kMarkedFileVersion ? has(kFlagParts | kFlagMarks)
                                                                    : true;
         if (!isAskedFor) return fail(offsetof(FileHeader, flags), "nothing in the flags asks for this version");
@@ -94,7 +97,11 @@ private:
         if ((h_.flags & kFlagImages) == 0) return {};
         const std::string wrong =
             wrongPlace(h_.images, blockOffset(blocksOf(h_.pages)), h_.fileBytes - sizeof(CommitRecord));
-        return wrong.empty() ? Result<void>() : fail(offsetof(FileHeader, images), wrong);
+        if (!wrong.empty()) return fail(offsetof(FileHeader, images), wrong);
+        if ((h_.images.channels != 0) != ((h_.flags & kFlagChannels) != 0))
+            return fail(offsetof(FileHeader, images) + offsetof(ImagesPlace, channels),
+                        "the flags disagree with the rows of channels");
+        return {};
     }
 
     [[nodiscard]] Result<void> sizes() const {

@@ -148,22 +148,25 @@ std::vector<ImageNeed> imageNeeds(const ImageTables& tables, const PageView& pag
     forEachTriangle(page, [&](const Index3& corners) {
         const uint32_t number = page.points[corners[0]].material;
         if (number == 0 || number > tables.materials.size()) return;
-        const MaterialRow& material = tables.materials[number - 1];
-        const ImageRow& image = tables.images[material.image];
         const auto p = cornersOf(page, corners);
         const glm::vec3 low = glm::min(p[0], glm::min(p[1], p[2])), high = glm::max(p[0], glm::max(p[1], p[2]));
-        const float texels = texelsPerCell(page, corners, glm::vec2(float(image.width), float(image.height)));
-        const bool isLarge = blocksAcross(image) >= kLargeBlocks;
-        const uint64_t part = isLarge ? partOf(0.5f * (low + high), page.header.log2Cells, texels) : 0;
-        const auto [found, isNew] = placeOf.try_emplace(uint64_t{material.image} << 32 | part, needs.size());
-        if (isNew) {
-            needs.push_back({material.image, texels, {}, low, high});
-            blocks.emplace_back(image);
-        }
-        ImageNeed& need = needs[found->second];
-        need.texelsPerCell = std::min(need.texelsPerCell, texels);
-        need.low = glm::min(need.low, low), need.high = glm::max(need.high, high);
-        blocks[found->second].add(page.points[corners[0]], page.points[corners[1]], page.points[corners[2]], material);
+        const auto add = [&](uint32_t shown) {
+            const ImageRow& image = tables.images[shown];
+            const float texels = texelsPerCell(page, corners, glm::vec2(float(image.width), float(image.height)));
+            const bool isLarge = blocksAcross(image) >= kLargeBlocks;
+            const uint64_t part = isLarge ? partOf(0.5f * (low + high), page.header.log2Cells, texels) : 0;
+            const auto [found, isNew] = placeOf.try_emplace(uint64_t{shown} << 32 | part, needs.size());
+            if (isNew) {
+                needs.push_back({shown, texels, {}, low, high});
+                blocks.emplace_back(image);
+            }
+            ImageNeed& need = needs[found->second];
+            need.texelsPerCell = std::min(need.texelsPerCell, texels);
+            need.low = glm::min(need.low, low), need.high = glm::max(need.high, high);
+            blocks[found->second].add(page.points[corners[0]], page.points[corners[1]], page.points[corners[2]],
+                                      tables.materials[number - 1]);
+        };
+        forEachImage(tables, number - 1, add);
     });
     for (size_t i = 0; i < needs.size(); ++i) needs[i].blocks = blocks[i].all();
     return needs;

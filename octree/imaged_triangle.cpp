@@ -28,7 +28,8 @@ std::optional<ImagedTriangle> imagedTriangle(const ImageSet& images, const PageV
     const MaterialRow& material = images.materials()[a.material - 1];
     if (!images.images()[material.image].isShown()) return {};
     const PlacedAxis u = placedAxis(a.u, b.u, c.u, material.wrapU), v = placedAxis(a.v, b.v, c.v, material.wrapV);
-    return ImagedTriangle{.image = &images.images()[material.image],
+    return ImagedTriangle{.material = a.material - 1,
+                          .image = &images.images()[material.image],
                           .wraps = {uint32_t(material.wrapU), uint32_t(material.wrapV)},
                           .factor = glm::unpackUnorm4x8(material.factor),
                           .place = {u.first, v.first},

@@ -12,6 +12,7 @@
 namespace vcp {
 
 struct ImagedTriangle {
+    uint32_t material;  ///< its row in the file's table
     const ImageSet::Image* image;
     ImageWraps wraps;
     glm::vec4 factor;           ///< RGBA, 0 to 1: multiplies what the image shows

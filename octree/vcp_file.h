@@ -1,4 +1,5 @@
-// The .vcp file, version 6; 7 where pages have open marks, and 8 where there are images. Files of versions 3 to 5 are
+// The .vcp file, version 6; 7 where pages have open marks, 8 where there are images, and 9 where materials have further
+// channels. Files of versions 3 to 5 are
 // read, too: they say nothing of parts; those of versions 3 and 4 have all pages without children on the finest level;
 // those of version 3 have no slab leaves and no kFlagCovering.
 //
@@ -35,7 +36,8 @@ namespace vcp {
 inline constexpr uint32_t kFileVersion = 6;
 inline constexpr uint32_t kMarkedFileVersion = 7;                          ///< with kFlagMarks
 inline constexpr uint32_t kImagesFileVersion = 8;                          ///< with kFlagImages
-inline constexpr uint32_t kOldestFileVersion = 3, kNewestFileVersion = 8;  ///< that are read
+inline constexpr uint32_t kChannelsFileVersion = 9;                        ///< with kFlagChannels
+inline constexpr uint32_t kOldestFileVersion = 3, kNewestFileVersion = 9;  ///< that are read
 inline constexpr uint32_t kMaxLevels = 22;                                 ///< Morton codes have 21 bits an axis
 inline constexpr uint32_t kMaxPaperLog2Cells = 20;
 inline constexpr uint64_t kDirectoryOffset = 4096;
@@ -77,7 +79,7 @@ struct FileHeader {
     uint32_t levels = 0;  ///< 1 to kMaxLevels
     uint32_t log2Cells =
         0;               ///< cells an edge of a page: 2^log2Cells; 1 to 7, of the method Paper to kMaxPaperLog2Cells
-    uint32_t flags = 0;  ///< kFlagColour, kFlagCovering, kFlagParts, kFlagMarks, kFlagImages
+    uint32_t flags = 0;  ///< kFlagColour, kFlagCovering, kFlagParts, kFlagMarks, kFlagImages, kFlagChannels
     Method method = Method::Certified;
     uint64_t triangles = 0, degenerateTriangles = 0, vertices = 0;
     uint64_t leaves = 0;      ///< soft, slab and hard leaves of the pages without children
@@ -104,6 +106,9 @@ inline constexpr uint32_t kFlagMarks = 8;
 /// With kFlagColour: triangles of the finest level may have texture coordinates and a material (octree/page/page.h).
 inline constexpr uint32_t kFlagImages = 16;
 
+/// With kFlagImages: some materials have further channels (octree/image/image_tables.h).
+inline constexpr uint32_t kFlagChannels = 32;
+
 /// What PageEntry::parts is made of. kPageHasMarks: with both others only; marks tell which surface is whose.
 inline constexpr uint8_t kPageHasClosed = 1, kPageHasOpen = 2, kPageHasMarks = 4;
 
@@ -115,7 +120,7 @@ static_assert(offsetof(FileHeader, origin) == 32 && offsetof(FileHeader, levels)
               offsetof(FileHeader, triangles) == 144);
 static_assert(offsetof(FileHeader, level) == 184 && offsetof(FileHeader, hash) == 184 + 24 * kMaxLevels &&
               offsetof(FileHeader, images) == 184 + 24 * kMaxLevels + 8 + 32 + 24 &&
-              sizeof(FileHeader) == offsetof(FileHeader, images) + 32);
+              sizeof(FileHeader) == offsetof(FileHeader, images) + 40);
 
 /// One page in the directory.
 struct PageEntry {

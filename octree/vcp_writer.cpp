@@ -60,8 +60,10 @@ Result<void> VcpWriter::append(PageEntry entry, const StoredPage& page) {
 }
 
 Result<void> VcpWriter::beginImages(ImageTables tables) {
-    images_ = {
-        .offset = end_, .images = uint32_t(tables.images.size()), .materials = uint32_t(tables.materials.size())};
+    images_ = {.offset = end_,
+               .images = uint32_t(tables.images.size()),
+               .materials = uint32_t(tables.materials.size()),
+               .channels = uint32_t(tables.channels.size())};
     images_.bytes = tables.bytes();
     for (TileRow& tile : tables.tiles) {
         tile.offset = images_.offset + images_.bytes;
@@ -100,6 +102,10 @@ Result<uint64_t> VcpWriter::commit(FileHeader header) {
         header.version = kImagesFileVersion;
         header.flags |= kFlagImages;
         header.images = images_;
+    }
+    if (images_.channels > 0) {
+        header.version = kChannelsFileVersion;
+        header.flags |= kFlagChannels;
     }
     header.pages = pages_;
     header.fileBytes = end_ + sizeof(CommitRecord);

@@ -68,7 +68,8 @@ struct Shading {
     std::vector<DirectedLight> moreLights;  ///< beside it: at most kMostLights - 1
     /// Light from everywhere; absent: a pale sky above dark ground.
     std::optional<EnvironmentLight> environment;
-    bool lightsBeside = false;            ///< the lights are on beside the environment, too
+    bool lightsBeside = false;  ///< the lights are on beside the environment, too
+    bool channels = true;       ///< where materials have normals, roughness, metalness or emission, Lit shows them
     glm::vec3 clay{0.80f, 0.76f, 0.70f};  ///< linear
     glm::vec3 cap{0.62f, 0.23f, 0.16f};   ///< linear; colour of cut solids
     bool shadows = false;                 ///< hard shadows: a further ray a pixel and light

@@ -49,6 +49,7 @@ HostLayer layerOf(PlacedLayer& placed, const FrameRequest& request) {
             .rays = pictureRays(placed.seen),
             .frame = frameConstants(placed.seen, &dataset, 1, hasColour, drawn.errorPixels, drawn.placement),
             .hasColour = hasColour,
+            .hasChannels = placed.seen.shading.channels,
             .caps = capsOf(request, dataset),
             .worldPerUnit = drawn.placement.scale,
             .number = drawn.number,

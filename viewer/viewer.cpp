@@ -131,6 +131,7 @@ void Viewer::show(const std::vector<PlacedDataset>& datasets, const MesoScene& s
     dataset_ = datasets.empty() ? nullptr : datasets.front().dataset;
     isOpen_ = hasBounds_ = true;
     isPaper_ = !datasets.empty() && surfaces.surfaces.empty();
+    hasChannels_ = false;
     bounds_ = surfaces.bounds;
     status_.triangles = status_.levels = 0;
     for (const PlacedDataset& each : datasets) {
@@ -139,6 +140,7 @@ void Viewer::show(const std::vector<PlacedDataset>& datasets, const MesoScene& s
                                             {header.boundsMax[0], header.boundsMax[1], header.boundsMax[2]}},
                                            each.placement));
         isPaper_ = isPaper_ && header.method == Method::Paper;
+        hasChannels_ = hasChannels_ || (header.flags & kFlagChannels) != 0;
         status_.triangles += header.triangles;
         status_.levels = std::max(status_.levels, header.levels);
     }

@@ -192,6 +192,8 @@ public:
     [[nodiscard]] bool isOpen() const { return isOpen_; }
     /// The first dataset; null without any.
     [[nodiscard]] const std::shared_ptr<const Dataset>& dataset() const { return dataset_; }
+    /// Whether some dataset's materials have channels (Shading::channels).
+    [[nodiscard]] bool hasChannels() const { return hasChannels_; }
     /// Returns why an action shows nothing on what is open; empty where it shows something.
     [[nodiscard]] std::string whyWithout(ViewerAction action) const;
     [[nodiscard]] glm::ivec2 size() const { return size_; }
@@ -277,6 +279,7 @@ private:
     bool isOpen_ = false;
     bool hasBounds_ = false;  // of what is open or foreseen: the camera may be moved
     bool isPaper_ = false;    // all datasets are of the method `paper`
+    bool hasChannels_ = false;
     Box bounds_;
     OrbitCamera camera_, home_;
     Shading shading_;

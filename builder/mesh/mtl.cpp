@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 #include <string_view>
 #include <utility>
 
@@ -53,6 +54,13 @@ private:
     const char* end_;
 };
 
+/// Where an image lies: texture coordinates of the file are scaled, then moved.
+struct MapPlace {
+    glm::vec2 uvScale{1}, uvOffset{0};
+
+    bool operator==(const MapPlace&) const = default;
+};
+
 class MtlReader {
 public:
     MtlReader(const std::filesystem::path& path, std::vector<MtlMaterial>& materials,
@@ -86,6 +94,7 @@ private:
             finish();
             current_ = {};
             current_.material.name = words.rest();
+            current_.material.channels.metalness = 0;
             open_ = true;
         } else if (keyword == "Kd") {
             std::array<double, 3> rgb{};
@@ -97,7 +106,66 @@ private:
         } else if (keyword == "map_d") {
             MaskRule& mask = current_.material.mask;
             readImage(words, mask.image, mask.uvScale, mask.uvOffset);
+        } else {
+            readChannel(keyword, words);
         }
+    }
+
+    /// Reads what a material has beside its colour.
+    void readChannel(std::string_view keyword, Words& words) {
+        MaterialChannels& channels = current_.material.channels;
+        const auto take = [&](float& number) {
+            double value = 0;
+            if (words.takeNumber(value)) number = float(std::clamp(value, 0.0, 1.0));
+        };
+        const auto image = [&](ImageSource& source, MapPlace& place) {
+            MapPlace read;
+            readImage(words, source, read.uvScale, read.uvOffset);
+            place = read;
+        };
+        if (keyword == "norm")
+            image(channels.normals, normals_);
+        else if (keyword == "map_Pr")
+            image(channels.surface, surface_);
+        else if (keyword == "map_Ke")
+            image(channels.emission, emission_);
+        else if (keyword == "map_Pm")
+            warn("images of metalness alone are not read; it is left out");
+        else if (keyword == "Pr")
+            take(channels.roughness);
+        else if (keyword == "Pm")
+            take(channels.metalness);
+        else if (keyword == "Ke")
+            for (int i = 0; i < 3; ++i) take(channels.emissionFactor[i]);
+    }
+
+    /// Leaves out channels that lie elsewhere than the colour, and those of materials without images.
+    void settleChannels() {
+        Material& material = current_.material;
+        MaterialChannels& channels = material.channels;
+        std::optional<MapPlace> place;
+        if (material.image.exists()) place = MapPlace{current_.uvScale, current_.uvOffset};
+        const auto fits = [&](const ImageSource& image, const MapPlace& of) {
+            if (!image.exists()) return true;
+            if (!place) place = of;
+            if (of == *place) return true;
+            warn(fmt::format("the image {} lies elsewhere than the colour of its material; it is left out",
+                             shown(image.path.filename().string())));
+            return false;
+        };
+        if (!fits(channels.normals, normals_)) channels.forgetNormals();
+        if (!fits(channels.surface, surface_)) channels.forgetSurface();
+        if (!fits(channels.emission, emission_)) channels.forgetEmission();
+        // The image of roughness is grey, and its blue would be taken for metalness.
+        if (channels.surface.exists() && channels.metalness > 0) {
+            warn(fmt::format("the material {} has metalness beside an image of roughness; it is left out",
+                             shown(material.name)));
+            channels.metalness = 0;
+        }
+        if (!place) channels = {};
+        if (!place || material.image.exists()) return;
+        current_.uvScale = place->uvScale;
+        current_.uvOffset = place->uvOffset;
     }
 
     void readImage(Words& words, ImageSource& image, glm::vec2& uvScale, glm::vec2& uvOffset) {
@@ -131,6 +199,9 @@ private:
         } else {
             const std::string_view value = words.take();
             if (option == "-clamp" && value == "on") current_.material.wrapU = current_.material.wrapV = Wrap::Clamp;
+            double scale = 1;
+            if (option == "-bm" && Words(value).takeNumber(scale))
+                current_.material.channels.normalScale = float(std::clamp(scale, -1000.0, 1000.0));
         }
     }
 
@@ -140,6 +211,7 @@ private:
         if (materials_.size() == kMostMaterials) return warn("more than 65536 materials; the rest is left out");
         if (current_.material.image.exists()) current_.material.factor = kWhite;
         settleMask();
+        settleChannels();
         materials_.push_back(std::move(current_));
     }
 
@@ -168,6 +240,7 @@ private:
     std::vector<std::string>& warnings_;
     std::vector<SideFile>& sideFiles_;
     MtlMaterial current_;
+    MapPlace normals_, surface_, emission_;  // of the current material's channels, where they have images
     bool open_ = false;
 };
 

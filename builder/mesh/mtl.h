@@ -1,9 +1,11 @@
-// Wavefront MTL: the materials of an OBJ file, as far as the colour of a surface goes.
+// Wavefront MTL: the materials of an OBJ file, as far as the colour of a surface goes, and what is beside it.
 //
 // Reads `newmtl`, `Kd`, and `map_Kd` and `map_d` with their options -o, -s and -clamp; other statements are skipped.
 // Where there is an image, it is the colour: Kd is ignored then, as many exporters leave a grey one behind. `map_d` is
-// a mask, by its alpha or, where it is opaque, its grey; without one, the alpha of `map_Kd` is. Images lie below the
-// folder of the MTL file; others are left out with a warning, as are faulty statements.
+// a mask, by its alpha or, where it is opaque, its grey; without one, the alpha of `map_Kd` is. Materials with images
+// may have channels: `norm` (normals, `-bm` their scale), `map_Pr` and `Pr` (roughness), `Pm` (metalness), `map_Ke` and
+// `Ke` (emission), placed as `map_Kd` is. Images lie below the folder of the MTL file; others are left out with a
+// warning, as are faulty statements.
 #pragma once
 
 #include <filesystem>

@@ -62,7 +62,7 @@ void ObjMaterials::begin() {
     std::set<Rgba8> colours;
     for (const MtlMaterial& m : read_) {
         colours.insert(m.material.factor);
-        hasImages_ = hasImages_ || m.material.image.exists() || m.material.mask.exists();
+        hasImages_ = hasImages_ || m.material.hasImages() || m.material.mask.exists();
         numbers_.try_emplace(m.material.name, uint32_t(materials_.size()));
         materials_.push_back(m.material);
     }
@@ -87,7 +87,7 @@ Result<void> ObjMaterials::addUv(double u, double v) {
 
 Result<void> ObjMaterials::paint(const std::array<std::optional<uint64_t>, 3>& uvs, MeshChunk& chunk) {
     std::array<glm::vec2, 3> corners{};
-    if (current_ != kNoMaterial && (materials_[current_].image.exists() || materials_[current_].mask.exists())) {
+    if (current_ != kNoMaterial && (materials_[current_].hasImages() || materials_[current_].mask.exists())) {
         const MtlMaterial& material = read_[current_];
         for (size_t i = 0; i < 3; ++i) {
             if (!uvs[i]) continue;

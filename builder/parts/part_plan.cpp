@@ -61,7 +61,8 @@ json jsonOf(const PartPlan& plan) {
             {"image_quality", {o.imageQuality.finest.value_or(-1), o.imageQuality.coarser.value_or(-1)}},
             {"memory", o.memoryBytes},
             {"vertex_normals", int(o.vertexNormals)},
-            {"masks", o.masks}};
+            {"masks", o.masks},
+            {"channels", o.channels}};
 }
 
 PartPlan planFrom(const json& j) {
@@ -86,6 +87,7 @@ PartPlan planFrom(const json& j) {
     if (quality[1] >= 0) plan.options.imageQuality.coarser = quality[1];
     plan.options.vertexNormals = VertexNormals(j.at("vertex_normals").get<int>());
     plan.options.masks = j.at("masks").get<bool>();
+    plan.options.channels = j.at("channels").get<bool>();
     plan.options.memoryBytes = j.at("memory").get<uint64_t>();
     return plan;
 }

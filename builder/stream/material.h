@@ -8,6 +8,7 @@
 #include <variant>
 
 #include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
 
 namespace vcp {
 
@@ -41,6 +42,26 @@ struct MaskRule {
     [[nodiscard]] bool exists() const { return image.exists() || cutoff > 1; }
 };
 
+/// What a material has beside its colour (glTF 2.0, 3.9): further images, over the same texture coordinates and with
+/// the same wrap modes, and factors.
+struct MaterialChannels {
+    ImageSource normals;   ///< from -1 to 1 in the image's own axes: right, up, away from the surface
+    ImageSource surface;   ///< green: roughness; blue: metalness
+    ImageSource emission;  ///< light, encoded as colours are
+    float normalScale = 1;
+    float roughness = 1, metalness = 1;  ///< 0 to 1: multiply the image's
+    glm::vec3 emissionFactor{0};         ///< at least 0: multiplies the image's light
+
+    /// Leaves out an image that cannot be read, with its factors, which say nothing without it.
+    void forgetNormals() { normals = {}; }
+    void forgetSurface() { surface = {}, roughness = 1, metalness = 0; }
+    void forgetEmission() { emission = {}, emissionFactor = glm::vec3(0); }
+
+    [[nodiscard]] bool exist() const {
+        return normals.exists() || surface.exists() || emission.exists() || emissionFactor != glm::vec3(0);
+    }
+};
+
 struct Material {
     std::string name;
     Rgba8 factor = kWhite;      ///< multiplies the other colours
@@ -50,6 +71,10 @@ struct Material {
     bool isCutOut = false;  ///< what is transparent was cut out of the mesh (MaskRule)
     Wrap wrapU = Wrap::Repeat;
     Wrap wrapV = Wrap::Repeat;
+    MaterialChannels channels;
+
+    /// Whether texture coordinates matter.
+    [[nodiscard]] bool hasImages() const { return image.exists() || channels.exist(); }
 };
 
 }  // namespace vcp

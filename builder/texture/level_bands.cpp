@@ -42,15 +42,31 @@ Span coverage(uint32_t coarse, uint32_t coarseSize, uint32_t size) {
     return span;
 }
 
-/// `fine`: the rows that `rows` begins with.
-void halveRow(const Rgba8* fine, uint32_t width, const Span& rows, std::span<const Span> columns, Rgba8* coarse) {
+/// Sums of texels that are numbers.
+using TexelNumbers = std::array<double, 4>;
+
+void addNumbers(TexelNumbers& sum, Rgba8 texel, double weight) {
+    for (int c = 0; c < 4; ++c) sum[size_t(c)] += weight * (texel >> (8 * c) & 0xFF);
+}
+
+/// Stores a sum of weights 1.
+Rgba8 roundedNumbers(const TexelNumbers& sum) {
+    Rgba8 texel = 0;
+    for (int c = 0; c < 4; ++c) texel |= Rgba8(std::clamp(sum[size_t(c)] + 0.5, 0.0, 255.0)) << (8 * c);
+    return texel;
+}
+
+/// `fine`: the rows that `rows` begins with. `add` and `coded`: how texels are summed up.
+template <class Sum>
+void halveRow(const Rgba8* fine, uint32_t width, const Span& rows, std::span<const Span> columns, Rgba8* coarse,
+              void (*add)(Sum&, Rgba8, double), Rgba8 (*coded)(const Sum&)) {
     for (const Span& column : columns) {
-        TexelLight sum{};
+        Sum sum{};
         for (uint32_t j = 0; j < 3; ++j)
             for (uint32_t i = 0; i < 3; ++i)
                 if (const double weight = rows.weights[j] * column.weights[i]; weight > 0)
-                    addTexel(sum, fine[size_t{j} * width + column.first + i], weight);
-        *coarse++ = encodedTexel(sum);
+                    add(sum, fine[size_t{j} * width + column.first + i], weight);
+        *coarse++ = coded(sum);
     }
 }
 
@@ -77,7 +93,7 @@ struct Band {
 
 class LevelBands {
 public:
-    LevelBands(glm::uvec2 size, const TakeBand& take) : take_(take) {
+    LevelBands(glm::uvec2 size, const TakeBand& take, TexelKind kind) : take_(take), kind_(kind) {
         bands_.emplace_back(size);
         for (; size != glm::uvec2(1); bands_.emplace_back(size)) size = halvedSize(size);
     }
@@ -120,13 +136,15 @@ private:
                  end < most && coverage(end, coarse.size.y, band.size.y).last() < band.end;)
                 ++end;
             if (end == coarse.end) return {};
-            halveRows(band.rows(band.first, band.end), band.first, band.size, coarse.rows(coarse.end, end), coarse.end);
+            halveRows(band.rows(band.first, band.end), band.first, band.size, coarse.rows(coarse.end, end), coarse.end,
+                      kind_);
             coarse.end = end;
             VCP_TRY(settle(level + 1));
         }
     }
 
     const TakeBand& take_;
+    const TexelKind kind_;
     std::vector<Band> bands_;  ///< the finest comes first
 };
 
@@ -135,19 +153,23 @@ private:
 glm::uvec2 halvedSize(glm::uvec2 size) { return {std::max(size.x / 2, 1u), std::max(size.y / 2, 1u)}; }
 
 void halveRows(std::span<const Rgba8> fine, uint32_t firstFine, glm::uvec2 fineSize, std::span<Rgba8> coarse,
-               uint32_t firstCoarse) {
+               uint32_t firstCoarse, TexelKind kind) {
     const glm::uvec2 size = halvedSize(fineSize);
     std::vector<Span> columns(size.x);
     for (uint32_t x = 0; x < size.x; ++x) columns[x] = coverage(x, size.x, fineSize.x);
     tbb::parallel_for(size_t{0}, coarse.size() / size.x, [&](size_t i) {
         const Span rows = coverage(firstCoarse + uint32_t(i), size.y, fineSize.y);
-        halveRow(fine.data() + size_t{rows.first - firstFine} * fineSize.x, fineSize.x, rows, columns,
-                 coarse.data() + i * size.x);
+        const Rgba8* const from = fine.data() + size_t{rows.first - firstFine} * fineSize.x;
+        Rgba8* const to = coarse.data() + i * size.x;
+        if (kind == TexelKind::Colours)
+            halveRow(from, fineSize.x, rows, columns, to, addTexel, encodedTexel);
+        else
+            halveRow(from, fineSize.x, rows, columns, to, addNumbers, roundedNumbers);
     });
 }
 
-Result<void> readLevels(ImageRows& image, const TakeBand& take) {
-    return tbb::this_task_arena::isolate([&] { return LevelBands(image.size(), take).read(image); });
+Result<void> readLevels(ImageRows& image, const TakeBand& take, TexelKind kind) {
+    return tbb::this_task_arena::isolate([&] { return LevelBands(image.size(), take, kind).read(image); });
 }
 
 uint64_t levelBandBytes(glm::uvec2 size) {

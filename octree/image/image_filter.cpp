@@ -26,12 +26,30 @@ float storedOf(const float* storedOfRoot, float light) {
     return storedOfRoot[below] + (at - float(below)) * (storedOfRoot[below + 1] - storedOfRoot[below]);
 }
 
-/// Adds the light of four texels, weighted by where the point is among them and by their alpha.
+/// Returns the weights of four texels by where the point is among them.
+std::array<float, 4> weightsOf(const TexelQuad& quad) {
+    return {(1 - quad.fy) * (1 - quad.fx), (1 - quad.fy) * quad.fx, quad.fy * (1 - quad.fx), quad.fy * quad.fx};
+}
+
+/// Calls visit(quad, weight) for what is read of an image about `at`.
+template <class Visit>
+void forEachQuad(const ImageSet::Image& image, ImageWraps wraps, glm::vec2 at, const ImagePlaces& places,
+                 const Visit& visit) {
+    const float part = 1 / places.count;
+    const auto finer = size_t(places.level);
+    const float coarser = places.level - float(finer);
+    for (int i = 0; i < int(places.count); ++i) {
+        const glm::vec2 place = at + ((float(i) + 0.5f) * part - 0.5f) * places.along;
+        visit(texelsAround(image, finer, wraps, place), (1 - coarser) * part);
+        if (coarser > 0) visit(texelsAround(image, finer + 1, wraps, place), coarser * part);
+    }
+}
+
+/// Adds the light of four texels, weighted by their alpha, too.
 void add(const float* lightOfByte, glm::vec4& sum, const TexelQuad& quad, float weight) {
-    const float weights[4] = {(1 - quad.fy) * (1 - quad.fx), (1 - quad.fy) * quad.fx, quad.fy * (1 - quad.fx),
-                              quad.fy * quad.fx};
+    const auto weights = weightsOf(quad);
     for (int i = 0; i < 4; ++i) {
-        const float share = weight * weights[i] * float(quad.texels[i] >> 24) / 255;
+        const float share = weight * weights[size_t(i)] * float(quad.texels[i] >> 24) / 255;
         sum += glm::vec4(share * lightOf(lightOfByte, quad.texels[i]), share);
     }
 }
@@ -67,18 +85,23 @@ TexelQuad texelsAround(const ImageSet::Image& image, size_t level, ImageWraps wr
 glm::vec4 filteredColour(const ImageSet::Image& image, ImageWraps wraps, glm::vec2 at, const ImagePlaces& places) {
     const float* const light = ColourTables::get().lightOfBytes();
     const float* const stored = ColourTables::get().storedOfRoots();
-    const float part = 1 / places.count;
-    const auto finer = size_t(places.level);
-    const float coarser = places.level - float(finer);
     glm::vec4 sum(0);
-    for (int i = 0; i < int(places.count); ++i) {
-        const glm::vec2 place = at + ((float(i) + 0.5f) * part - 0.5f) * places.along;
-        add(light, sum, texelsAround(image, finer, wraps, place), (1 - coarser) * part);
-        if (coarser > 0) add(light, sum, texelsAround(image, finer + 1, wraps, place), coarser * part);
-    }
+    forEachQuad(image, wraps, at, places, [&](const TexelQuad& quad, float weight) { add(light, sum, quad, weight); });
     if (!(sum.w > 0)) return glm::vec4(0);
     const float scale = 1 / sum.w;
     return {storedOf(stored, sum.x * scale), storedOf(stored, sum.y * scale), storedOf(stored, sum.z * scale), sum.w};
+}
+
+glm::vec3 filteredNumbers(const ImageSet::Image& image, ImageWraps wraps, glm::vec2 at, const ImagePlaces& places) {
+    glm::vec3 sum(0);
+    forEachQuad(image, wraps, at, places, [&](const TexelQuad& quad, float weight) {
+        const auto weights = weightsOf(quad);
+        for (size_t i = 0; i < 4; ++i)
+            sum += weight * weights[i] *
+                   glm::vec3(float(quad.texels[i] & 255u), float(quad.texels[i] >> 8 & 255u),
+                             float(quad.texels[i] >> 16 & 255u));
+    });
+    return sum / 255.0f;
 }
 
 }  // namespace vcp

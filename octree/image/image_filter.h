@@ -84,4 +84,7 @@ TexelQuad texelsAround(const ImageSet::Image& image, size_t level, ImageWraps wr
 /// not in memory, the next coarser one is read. Precondition: the image is shown. Any thread.
 glm::vec4 filteredColour(const ImageSet::Image& image, ImageWraps wraps, glm::vec2 at, const ImagePlaces& places);
 
+/// Returns the same mean of an image whose texels are numbers and no colours: of red, green and blue, 0 to 1.
+glm::vec3 filteredNumbers(const ImageSet::Image& image, ImageWraps wraps, glm::vec2 at, const ImagePlaces& places);
+
 }  // namespace vcp

@@ -12,7 +12,7 @@ ImageSet::Level::Level(const ImageLevel& level)
       tilesX(level.tilesX()),
       tiles(level.tiles()) {}
 
-ImageSet::ImageSet(const ImageTables& tables) : materials_(tables.materials) {
+ImageSet::ImageSet(const ImageTables& tables) : materials_(tables.materials), channels_(tables.channels) {
     for (const ImageRow& row : tables.images) {
         images_.push_back({row.width, row.height, row.levels, {}});
         for (const ImageLevel& level : levelsOf(row)) images_.back().levels.emplace_back(level);
@@ -23,6 +23,14 @@ uint64_t ImageSet::Level::texelsOf(size_t i) const {
     const ImageLevel level{width, height, 0, 1u << log2Edge};
     const glm::uvec2 size = level.sizeOf({i % tilesX, i / tilesX});
     return uint64_t{size.x} * size.y;
+}
+
+const ChannelRow* ImageSet::channelsOf(uint32_t material) const {
+    if (channels_.empty() || channels_[material].isGiven == 0) return nullptr;
+    const ChannelRow& row = channels_[material];
+    for (const uint32_t image : {row.normals, row.surface, row.emission})
+        if (image != 0 && !images_[image - 1].isShown()) return nullptr;
+    return &row;
 }
 
 void ImageSet::set(uint32_t number, uint32_t level, glm::uvec2 tile, Tile texels) {

@@ -55,6 +55,10 @@ public:
 
     [[nodiscard]] std::span<const Image> images() const { return images_; }
     [[nodiscard]] std::span<const MaterialRow> materials() const { return materials_; }
+    /// Whether some material has channels.
+    [[nodiscard]] bool hasChannels() const { return !channels_.empty(); }
+    /// Returns the channels of a material; null where it has none, or not all of their images are shown.
+    [[nodiscard]] const ChannelRow* channelsOf(uint32_t material) const;
     [[nodiscard]] uint64_t bytes() const { return bytes_; }
 
     /// Puts a tile in its place, or takes it away (null). `tile`: its column and row.
@@ -65,6 +69,7 @@ public:
 private:
     std::vector<Image> images_;
     std::vector<MaterialRow> materials_;
+    std::vector<ChannelRow> channels_;  // one for each material, or none
     uint64_t bytes_ = 0;
 };
 

@@ -1,6 +1,8 @@
 #include "octree/image/image_tables.h"
 
+#include <cmath>
 #include <cstring>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -27,21 +29,29 @@ std::vector<Row> takeRows(std::span<const std::byte>& bytes, uint64_t count) {
     return rows;
 }
 
+/// Returns the bytes of the rows that a section begins with, before its tiles'.
+uint64_t bytesOfRows(const ImagesPlace& place) {
+    return place.images * sizeof(ImageRow) + place.materials * sizeof(MaterialRow) +
+           place.channels * sizeof(ChannelRow);
+}
+
 class TableCheck {
 public:
     TableCheck(const ByteReader& reader, const ImagesPlace& place) : reader_(reader), place_(place) {}
 
     Result<ImageTables> run() {
         ImageTables tables;
-        const uint64_t rowBytes = place_.images * sizeof(ImageRow) + place_.materials * sizeof(MaterialRow);
+        const uint64_t rowBytes = bytesOfRows(place_);
         std::vector<std::byte> bytes;
         VCP_TRY(extend(bytes, rowBytes));
         std::span<const std::byte> rest(bytes);
         tables.images = takeRows<ImageRow>(rest, place_.images);
         tables.materials = takeRows<MaterialRow>(rest, place_.materials);
+        tables.channels = takeRows<ChannelRow>(rest, place_.channels);
         uint64_t tiles = 0;
         for (size_t i = 0; i < tables.images.size(); ++i) VCP_TRY(image(i, tables.images[i], tiles));
         for (size_t i = 0; i < tables.materials.size(); ++i) VCP_TRY(material(i, tables.materials[i]));
+        for (size_t i = 0; i < tables.channels.size(); ++i) VCP_TRY(channels(i, tables.channels[i]));
         if (tiles > (place_.bytes - rowBytes) / sizeof(TileRow))
             return broken("images", 0, "there are fewer bytes than their tiles ask for");
         VCP_TRY(extend(bytes, rowBytes + tiles * sizeof(TileRow)));
@@ -95,6 +105,34 @@ private:
         return {};
     }
 
+    Result<void> channels(size_t i, const ChannelRow& row) const {
+        const auto fail = [&](uint64_t field, const char* message) {
+            return broken(fmt::format("channels of material {}", i),
+                          place_.images * sizeof(ImageRow) + place_.materials * sizeof(MaterialRow) +
+                              i * sizeof(ChannelRow) + field,
+                          message);
+        };
+        if (row.isGiven > 1) return fail(offsetof(ChannelRow, isGiven), "they are there or not");
+        static constexpr ChannelRow kNone;
+        if (row.isGiven == 0)
+            return std::memcmp(&row, &kNone, sizeof row) == 0 ? Result<void>() : fail(0, "there should be none");
+        const std::pair<uint32_t, size_t> images[] = {{row.normals, offsetof(ChannelRow, normals)},
+                                                      {row.surface, offsetof(ChannelRow, surface)},
+                                                      {row.emission, offsetof(ChannelRow, emission)}};
+        for (const auto& [number, at] : images)
+            if (number > place_.images) return fail(at, "name an image that there is not");
+        if (!(std::abs(row.normalScale) <= kMostNormalScale))
+            return fail(offsetof(ChannelRow, normalScale), "the scale of their normals is out of range");
+        if (!(row.roughness >= 0 && row.roughness <= 1))
+            return fail(offsetof(ChannelRow, roughness), "their roughness is out of range");
+        if (!(row.metalness >= 0 && row.metalness <= 1))
+            return fail(offsetof(ChannelRow, metalness), "their metalness is out of range");
+        for (size_t k = 0; k < std::size(row.emissionFactor); ++k)
+            if (!(row.emissionFactor[k] >= 0 && row.emissionFactor[k] <= kMostEmission))
+                return fail(offsetof(ChannelRow, emissionFactor) + k * sizeof(float), "their emission is out of range");
+        return {};
+    }
+
     /// Tiles follow each other, from the end of the tables to that of the section.
     [[nodiscard]] Result<void> tileTable(const ImageTables& tables) const {
         const uint64_t begin = tables.bytes(), before = begin - tables.tiles.size() * sizeof(TileRow);
@@ -123,6 +161,7 @@ std::vector<std::byte> ImageTables::stored() const {
     std::vector<std::byte> all;
     append(all, images);
     append(all, materials);
+    append(all, channels);
     append(all, tiles);
     return all;
 }
@@ -131,8 +170,9 @@ std::string wrongPlace(const ImagesPlace& place, uint64_t begin, uint64_t end) {
     if (place.images == 0 || place.materials == 0) return "there are no images";
     if (place.offset < begin || place.offset > end || place.bytes > end - place.offset)
         return "the section of images is out of range";
-    if (place.images * sizeof(ImageRow) + place.materials * sizeof(MaterialRow) > place.bytes)
-        return "the section of images is too short for their tables";
+    if (place.channels != 0 && place.channels != place.materials) return "not all materials have a row of channels";
+    if (place.reserved != 0) return "reserved bytes must be zero";
+    if (bytesOfRows(place) > place.bytes) return "the section of images is too short for their tables";
     return {};
 }
 

@@ -2,10 +2,11 @@
 //
 //   24 bytes an image        ImageRow
 //   16 bytes a material      MaterialRow; triangles name them by their number plus 1
+//   40 bytes a material      ChannelRow, where some material has channels; else there are none
 //   24 bytes a tile          TileRow: image by image, coarse levels first, Morton order (x lowest) within a level
 //   ...                      the tiles, in the order of their table, without gaps
 //
-// The header has the hash of the three tables. No column or row of an image is stored twice: filters read beyond a
+// The header has the hash of the tables. No column or row of an image is stored twice: filters read beyond a
 // tile's edge in the tile beside it.
 #pragma once
 
@@ -52,6 +53,22 @@ struct MaterialRow {
 };
 static_assert(sizeof(MaterialRow) == 16);
 
+/// What factors of channels are at most.
+inline constexpr float kMostNormalScale = 1000, kMostEmission = 1e6f;
+
+/// What a material has beside its colour (glTF 2.0, 3.9): further images over the same coordinates, with the same wrap
+/// modes, and factors. Images are named by their number plus 1; 0: there is none. All zero where it has nothing.
+struct ChannelRow {
+    uint32_t isGiven = 0;  ///< 1: the material has channels
+    uint32_t normals = 0;  ///< image of normals in the image's own axes, from -1 to 1: right, up, away from the surface
+    uint32_t surface = 0;  ///< image with the roughness as green and the metalness as blue
+    uint32_t emission = 0;               ///< image of light, encoded as colours are
+    float normalScale = 0;               ///< multiplies right and up
+    float roughness = 0, metalness = 0;  ///< 0 to 1: multiply the image's
+    float emissionFactor[3] = {};        ///< at least 0: multiplies the image's light
+};
+static_assert(sizeof(ChannelRow) == 40);
+
 struct TileRow {
     uint64_t offset = 0;  ///< in the file
     uint64_t hash = 0;    ///< XXH3-64 of the stored bytes
@@ -63,15 +80,27 @@ static_assert(sizeof(TileRow) == 24);
 struct ImageTables {
     std::vector<ImageRow> images;
     std::vector<MaterialRow> materials;
+    std::vector<ChannelRow> channels;  ///< one for each material, or none
     std::vector<TileRow> tiles;
 
     [[nodiscard]] uint64_t bytes() const {
         return images.size() * sizeof(ImageRow) + materials.size() * sizeof(MaterialRow) +
-               tiles.size() * sizeof(TileRow);
+               channels.size() * sizeof(ChannelRow) + tiles.size() * sizeof(TileRow);
     }
     /// Returns the tables as they are stored.
     [[nodiscard]] std::vector<std::byte> stored() const;
 };
+
+/// Calls visit(its number) for each image that a material shows: that of its colour, then those of its channels.
+/// Precondition: the tables were checked.
+template <class Visit>
+void forEachImage(const ImageTables& tables, uint32_t material, const Visit& visit) {
+    visit(tables.materials[material].image);
+    if (tables.channels.empty()) return;
+    const ChannelRow& row = tables.channels[material];
+    for (const uint32_t number : {row.normals, row.surface, row.emission})
+        if (number != 0) visit(number - 1);
+}
 
 /// Returns what is wrong with the place of a section in a file, whose pages end before `end`, in one line; empty where
 /// nothing is. `begin`: the end of the directory.

@@ -1,6 +1,9 @@
 // The shared maths of light on hits (render/shared/hit_light.h) in C++, for one pixel.
 #pragma once
 
+#include <array>
+#include <cstddef>
+
 #include <glm/trigonometric.hpp>
 #include <glm/vec4.hpp>
 
@@ -16,6 +19,16 @@ namespace vcp::f32 {
 }  // namespace vcp::f32
 
 namespace vcp {
+
+/// The light of each value that a byte stores of a colour (lightOfColour).
+inline const std::array<float, 256>& lightOfColourBytes() {
+    static const std::array<float, 256> table = [] {
+        std::array<float, 256> light;
+        for (size_t i = 0; i < light.size(); ++i) light[i] = f32::lightOfColour(glm::vec3(float(i) / 255)).x;
+        return light;
+    }();
+    return table;
+}
 
 /// Returns a light as FrameConstants::lightDirection has it, and its bits of the part of the light that is seen, as the
 /// shaders have them.

@@ -27,6 +27,7 @@ struct SkyPlanes {
     std::vector<uint32_t> albedo;  // RGBA8
     std::vector<uint8_t> sun, sky;
     std::vector<HostHit> hits;
+    std::vector<std::vector<PixelChannels>> channels;  // of each tile, row by row; empty where none are shown
 };
 
 class LayerDrawing {
@@ -37,6 +38,8 @@ public:
     Result<void> draw(const HostCastOptions& options) {
         const bool averagesSky = frame_.occlusionRays > 0;
         if (averagesSky) planes_.emplace(picture_.colours.size());
+        if (averagesSky && tiles_.hasChannels())
+            planes_->channels.resize(tileOf(picture_.size + glm::ivec2(kTileWidth, kTileHeight)));
         VCP_TRY(forEachTile(picture_.size, options, [&](glm::ivec2 corner) {
             TileHits hits;
             hits.corner = corner;
@@ -50,6 +53,12 @@ public:
 private:
     [[nodiscard]] size_t at(glm::ivec2 pixel) const {
         return size_t(pixel.y) * size_t(picture_.size.x) + size_t(pixel.x);
+    }
+
+    /// Returns the number of the tile that has a pixel.
+    [[nodiscard]] size_t tileOf(glm::ivec2 pixel) const {
+        const int across = (picture_.size.x + kTileWidth - 1) / kTileWidth;
+        return size_t(pixel.y / kTileHeight) * size_t(across) + size_t(pixel.x / kTileWidth);
     }
 
     template <class Visit>
@@ -76,6 +85,7 @@ private:
         }
         tiles_.findAlbedo(hits, surface);
         shadeTile(frame_, surface, colours);
+        if (tiles_.hasChannels()) shadeChannels(frame_, surface, tiles_.findChannels(hits, surface), colours);
         if (frame_.shadingMode == frame::kShadeWireframe)
             forEachHit(hits, [&](glm::ivec2 pixel, int i) {
                 if (!hits.onCap[size_t(i)]) colours[i] = withLine(colours[i], tiles_.lineOf(hits, pixel, i));
@@ -152,6 +162,7 @@ private:
     void keep(const TileHits& hits, const TileSurface& surface) {
         uint32_t colours[kTilePixels] = {};
         if (tiles_.isColoured()) tiles_.findOwnColours(hits, colours);
+        if (tiles_.hasChannels()) planes_->channels[tileOf(hits.corner)] = tiles_.findChannels(hits, surface);
         forEachHit(hits, [&](glm::ivec2 pixel, int i) {
             const size_t to = at(pixel);
             planes_->depth[to] = tiles_.depthInCells(hits.depth[i]);
@@ -187,6 +198,7 @@ private:
         if (!hits.any) return;
         alignas(32) uint32_t colours[kTilePixels];
         shadeTile(frame_, surface, colours);
+        if (tiles_.hasChannels()) shadeChannels(frame_, surface, planes_->channels[tileOf(corner)], colours);
         put(hits, surface, colours);
     }
 
@@ -223,16 +235,12 @@ HostPicture::HostPicture(glm::ivec2 pictureSize, std::span<const uint32_t> backg
 }
 
 void SampledLight::add(std::span<const uint32_t> colours, size_t first) {
-    static const std::array<float, 256> kLight = [] {
-        std::array<float, 256> light;
-        for (size_t i = 0; i < light.size(); ++i) light[i] = f32::lightOfColour(glm::vec3(float(i) / 255)).x;
-        return light;
-    }();
+    const std::array<float, 256>& light = lightOfColourBytes();
     for (size_t i = 0; i < colours.size(); ++i) {
         const uint32_t c = colours[i];
         const float alpha = float(c >> 24) / 255;
         sums_[first + i] +=
-            glm::vec4(glm::vec3(kLight[c & 255], kLight[c >> 8 & 255], kLight[c >> 16 & 255]) * alpha, alpha);
+            glm::vec4(glm::vec3(light[c & 255], light[c >> 8 & 255], light[c >> 16 & 255]) * alpha, alpha);
     }
     if (first + colours.size() == sums_.size()) ++samples_;
 }

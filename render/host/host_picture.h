@@ -63,6 +63,7 @@ struct HostLayer {
     PictureRays rays;               ///< in the dataset's own space
     frame::FrameConstants frame;    ///< as the shaders get it
     bool hasColour = false;         ///< hits have colours
+    bool hasChannels = false;       ///< channels of materials are shown, where the scene's images have some
     Caps caps = Caps::None;         ///< fills what the section planes of the rays cut open
     double worldPerUnit = 1;        ///< world units per unit of the dataset's own
     uint32_t number = 0;            ///< of the dataset in the picture

@@ -71,6 +71,8 @@ LayerTiles::LayerTiles(const HostLayer& layer, glm::ivec2 size)
       size_(size),
       isColoured_(layer.hasColour &&
                   (layer.frame.shadingMode == frame::kShadeLit || layer.frame.shadingMode == frame::kShadeUnlit)),
+      hasChannels_(layer.hasColour && layer.hasChannels && layer.frame.shadingMode == frame::kShadeLit &&
+                   layer.scene.images() != nullptr && layer.scene.images()->hasChannels()),
       turn_(layer.frame.rotation.w, layer.frame.rotation.x, layer.frame.rotation.y, layer.frame.rotation.z),
       sections_(inCells(layer.rays.sections, layer.scene.grid().origin, layer.scene.grid().cell)),
       beginInEye_(sections_.empty() && layer.rays.originPerX == glm::dvec3(0) &&
@@ -135,8 +137,16 @@ void LayerTiles::findAlbedo(const TileHits& hits, TileSurface& surface) const {
 }
 
 void LayerTiles::findOwnColours(const TileHits& hits, uint32_t (&colours)[kTilePixels]) const {
-    const auto perDepth = float(double(layer_.frame.pixelEdgePerDepth) / layer_.scene.grid().cell);
-    findColours(layer_.scene, layer_.rays, {layer_.frame.pixelEdge, perDepth}, hits, colours);
+    findColours(layer_.scene, layer_.rays, pixelEdges(), hits, colours);
+}
+
+std::vector<PixelChannels> LayerTiles::findChannels(const TileHits& hits, const TileSurface& surface) const {
+    if (!hasChannels_) return {};
+    return vcp::findChannels(layer_.scene, layer_.rays, pixelEdges(), hits, surface);
+}
+
+PixelEdges LayerTiles::pixelEdges() const {
+    return {layer_.frame.pixelEdge, float(double(layer_.frame.pixelEdgePerDepth) / layer_.scene.grid().cell)};
 }
 
 void LayerTiles::setClay(TileSurface& surface) const {

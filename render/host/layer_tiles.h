@@ -12,6 +12,7 @@
 #include "render/host/host_picture.h"
 #include "render/host/light_rays.h"
 #include "render/host/section_cut.h"
+#include "render/host/tile_channels.h"
 #include "render/host/tile_hits.h"
 #include "render/host/tile_shading.h"
 #include "render/host/wireframe.h"
@@ -61,12 +62,16 @@ public:
     void findAlbedo(const TileHits& hits, TileSurface& surface) const;
     /// Finds the same of those that are not on caps, RGBA8; the other elements stay what they are.
     void findOwnColours(const TileHits& hits, uint32_t (&colours)[kTilePixels]) const;
+    /// Finds what channels of materials say at a tile's hits; nothing where none are shown.
+    [[nodiscard]] std::vector<PixelChannels> findChannels(const TileHits& hits, const TileSurface& surface) const;
     void setClay(TileSurface& surface) const;
     /// Returns the line of the wireframe at a hit.
     [[nodiscard]] HitLine lineOf(const TileHits& hits, glm::ivec2 pixel, int i) const;
 
     /// Whether hits are shown in their own colours.
     [[nodiscard]] bool isColoured() const { return isColoured_; }
+    /// Whether some hits may have channels of materials.
+    [[nodiscard]] bool hasChannels() const { return hasChannels_; }
     /// The rotation from the dataset's axes to the world's.
     [[nodiscard]] const glm::quat& turn() const { return turn_; }
     [[nodiscard]] HostHit hitOf(const TileHits& hits, int i) const;
@@ -98,10 +103,12 @@ private:
     void markBegin(glm::ivec2 pixel) const;
     void markPages(const TileHits& hits) const;
     void fade(TileHits& hits) const;
+    /// A pixel's edge at a depth in world units.
+    [[nodiscard]] PixelEdges pixelEdges() const;
 
     const HostLayer& layer_;
     const glm::ivec2 size_;
-    const bool isColoured_;
+    const bool isColoured_, hasChannels_;
     const glm::quat turn_;
     const std::vector<SectionCut> sections_;  // finest cells from the root's lowest corner
     const bool beginInEye_;                   // all rays begin at one point

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <functional>
 #include <memory>
+#include <optional>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
@@ -43,13 +44,20 @@ struct FarLook {
 
 /// What is kept of each pixel beside the picture's depth, normal and hit; lengths are world units.
 struct LitPlanes {
-    LitPlanes(size_t pixels, bool hasFar)
-        : albedo(pixels), lift(pixels), edge(pixels), sun(pixels), sky(pixels), far(hasFar ? pixels : 0) {}
+    LitPlanes(size_t pixels, bool hasFar, bool hasChannels)
+        : albedo(pixels),
+          lift(pixels),
+          edge(pixels),
+          sun(pixels),
+          sky(pixels),
+          far(hasFar ? pixels : 0),
+          channels(hasChannels ? pixels : 0) {}
 
     std::vector<glm::vec3> albedo;
     std::vector<float> lift, edge;  // by which rays of light begin above the hit; of the pixel there
     std::vector<uint8_t> sun, sky;
-    std::vector<FarLook> far;  // empty where no surface is seen from far
+    std::vector<FarLook> far;                          // empty where no surface is seen from far
+    std::vector<std::optional<HitChannels>> channels;  // in the world's axes; empty where no layer shows any
 };
 
 /// The hits of a tile, and the light there.
@@ -69,14 +77,13 @@ public:
     LitDrawing(const LitScene& scene, HostPicture& picture)
         : picture_(picture),
           surfaces_(scene.surfaces),
+          lit_(litLayers(scene, picture.size)),
           planes_(picture.colours.size(),
-                  std::any_of(scene.surfaces.begin(), scene.surfaces.end(), std::mem_fn(&HostSurface::isFarDrawn))),
+                  std::any_of(scene.surfaces.begin(), scene.surfaces.end(), std::mem_fn(&HostSurface::isFarDrawn)),
+                  std::any_of(lit_.begin(), lit_.end(), [](const auto& each) { return each->tiles.hasChannels(); })),
           frame_(scene.frame),
           reach_(scene.occlusionReach) {
-        for (const HostLayer& layer : scene.layers) {
-            lit_.push_back(std::make_unique<Lit>(layer, picture.size));
-            isMarking_ = isMarking_ || layer.marks != nullptr;
-        }
+        for (const HostLayer& layer : scene.layers) isMarking_ = isMarking_ || layer.marks != nullptr;
         if (!surfaces_.empty()) picture_.iterations.resize(picture_.colours.size());
     }
 
@@ -107,6 +114,13 @@ public:
     }
 
 private:
+    using LitLayers = std::vector<std::unique_ptr<const Lit>>;
+    static LitLayers litLayers(const LitScene& scene, glm::ivec2 size) {
+        LitLayers layers;
+        for (const HostLayer& layer : scene.layers) layers.push_back(std::make_unique<Lit>(layer, size));
+        return layers;
+    }
+
     [[nodiscard]] size_t at(glm::ivec2 pixel) const {
         return size_t(pixel.y) * size_t(picture_.size.x) + size_t(pixel.x);
     }
@@ -120,6 +134,8 @@ private:
         TileSurface surface;
         findNormals(each.layer.rays, hits, surface);
         each.tiles.findAlbedo(hits, surface);
+        std::vector<std::optional<HitChannels>> channels(planes_.channels.empty() ? 0 : kTilePixels);
+        for (const auto& [i, of] : each.tiles.findChannels(hits, surface)) channels[size_t(i)] = turned(each, of);
         forEachPixel(picture_.size, corner, [&](glm::ivec2 pixel, int i) {
             const size_t to = at(pixel);
             const auto depth = float(double(hits.depth[i]) * each.layer.worldPerUnit);
@@ -131,7 +147,15 @@ private:
             planes_.albedo[to] = {surface.red[i], surface.green[i], surface.blue[i]};
             planes_.lift[to] = float(double(each.tiles.liftAt(inCells)) * each.cell);
             planes_.edge[to] = float(double(each.tiles.pixelEdgeAt(inCells)) * each.cell);
+            if (!planes_.channels.empty()) planes_.channels[to] = channels[size_t(i)];
         });
+    }
+
+    /// Returns channels in the world's axes.
+    static HitChannels turned(const Lit& each, HitChannels channels) {
+        channels.normal = each.tiles.turn() * channels.normal;
+        channels.towardsEye = each.tiles.turn() * channels.towardsEye;
+        return channels;
     }
 
     /// Does the same with a surface.
@@ -148,6 +172,7 @@ private:
             planes_.lift[to] = caster.surface().view.shadowLift;
             planes_.edge[to] = hit.width;
             if (!planes_.far.empty()) planes_.far[to] = {hit.isFar, hit.sky, hit.light};
+            if (!planes_.channels.empty()) planes_.channels[to].reset();
         });
     }
 
@@ -257,6 +282,7 @@ private:
         const LitTile tile = hitsOf(corner);
         if (tile.count == 0) return;
         TileSurface surface{};
+        std::vector<PixelChannels> channels;
         for (size_t k = 0; k < tile.count; ++k) {
             const auto& [pixel, from, normal, onSurface] = tile.pixels[k];
             surface.normalX[k] = normal.x, surface.normalY[k] = normal.y, surface.normalZ[k] = normal.z;
@@ -265,9 +291,12 @@ private:
             surface.sky[k] = averagesSky
                                  ? skyAround(picture_.depth, planes_.sky, picture_.size, pixel, 8 * planes_.edge[from])
                                  : 1.0f;
+            if (!planes_.channels.empty() && planes_.channels[from])
+                channels.push_back({int(k), *planes_.channels[from]});
         }
         alignas(32) uint32_t colours[kTilePixels];
         shadeTile(frame_, surface, colours);
+        shadeChannels(frame_, surface, channels, colours);
         for (size_t k = 0; k < tile.count; ++k) {
             const size_t to = tile.pixels[k].at;
             const bool isLit = frame_.shadingMode != frame::kShadeNormals && frame_.shadingMode != frame::kShadeUnlit;
@@ -292,12 +321,12 @@ private:
 
     HostPicture& picture_;
     const std::span<const HostSurface> surfaces_;
+    const LitLayers lit_;
     LitPlanes planes_;
     const frame::FrameConstants frame_;  // in the world's axes
     const float reach_;                  // of occlusion, world units
     std::atomic<uint64_t> unresolvedRays_ = 0, farHits_ = 0;
     bool isMarking_ = false;
-    std::vector<std::unique_ptr<const Lit>> lit_;
 };
 
 }  // namespace

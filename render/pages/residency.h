@@ -73,6 +73,8 @@ public:
     /// The tiles of the file's images to draw from, the same until the scene's next update; null: the colours of
     /// vertices are shown.
     [[nodiscard]] std::shared_ptr<const ImageSet> images() const { return images_ ? images_->shown() : nullptr; }
+    /// Whether some material has channels that images() may show.
+    [[nodiscard]] bool hasChannels() const { return images_ && !images_->pieces().tables().channels.empty(); }
     /// How much the view needs each piece of the images on some of its pages (ImageResidency::needsOn). Precondition:
     /// images() is not null.
     [[nodiscard]] std::vector<float> needsOn(const SelectionView& view, const std::vector<uint64_t>& pages) const {

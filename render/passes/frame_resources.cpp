@@ -331,12 +331,13 @@ Result<ComputePipeline> FrameResources::pipeline(std::span<const uint32_t> spirv
 
 Result<void> PipelineVariants::choose(FrameResources& resources, const PassConstants& c,
                                       std::initializer_list<uint32_t> more) {
-    std::vector<uint32_t> values{c.access == PageAccess::TexelBuffer,
-                                 c.poolChunks,
-                                 c.chunkShift,
-                                 uint32_t(c.colour) + uint32_t(c.colour && c.images),
-                                 c.countSteps,
-                                 c.falseColour};
+    std::vector<uint32_t> values{
+        c.access == PageAccess::TexelBuffer,
+        c.poolChunks,
+        c.chunkShift,
+        uint32_t(c.colour) + uint32_t(c.colour && c.images) + uint32_t(c.colour && c.images && c.channels),
+        c.countSteps,
+        c.falseColour};
     values.insert(values.end(), more.begin(), more.end());
     ComputePipeline& variant = variants_[values];
     if (variant.handle() == VK_NULL_HANDLE) {

@@ -48,7 +48,7 @@ struct PictureSize {
 struct PassConstants {
     PageAccess access = PageAccess::TexelBuffer;
     uint32_t poolChunks = 1, chunkShift = 26;
-    bool colour = false, images = false, countSteps = false, falseColour = false;
+    bool colour = false, images = false, channels = false, countSteps = false, falseColour = false;
     bool operator==(const PassConstants&) const = default;
 };
 

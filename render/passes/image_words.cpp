@@ -1,5 +1,6 @@
 #include "render/passes/image_words.h"
 
+#include <bit>
 #include <vector>
 
 #include <fmt/format.h>
@@ -14,6 +15,11 @@ constexpr uint64_t kTableBytes = 4ull << 20;
 /// Where the words of images stand: those that all sets of a file share, which the texels follow.
 struct Layout {
     explicit Layout(const ImageSet& set) : tables(uint32_t(4 + 4 * set.materials().size())) {
+        for (uint32_t i = 0; i < set.materials().size(); ++i) {
+            const bool hasChannels = set.channelsOf(i) != nullptr;
+            channels.push_back(hasChannels ? tables : 0);
+            tables += hasChannels ? 12 : 0;
+        }
         for (const ImageSet::Image& image : set.images()) {
             images.push_back(tables);
             tables += uint32_t(4 + 4 * image.levels.size());
@@ -25,17 +31,32 @@ struct Layout {
             }
     }
 
-    std::vector<uint32_t> images;  // word of each image
-    std::vector<uint32_t> tiles;   // of the first tile of each level, image by image
-    uint32_t tables;               // how many words there are before the texels
+    std::vector<uint32_t> channels;  // word of each material's channels, 0 where it has none
+    std::vector<uint32_t> images;    // word of each image
+    std::vector<uint32_t> tiles;     // of the first tile of each level, image by image
+    uint32_t tables;                 // how many words there are before the texels
 };
+
+void addChannels(const ChannelRow& row, const Layout& layout, std::vector<uint32_t>& words) {
+    const auto imageOf = [&](uint32_t number) { return number != 0 ? layout.images[number - 1] : 0; };
+    const auto bits = [](float number) { return std::bit_cast<uint32_t>(number); };
+    words.insert(words.end(), {imageOf(row.normals), imageOf(row.surface), imageOf(row.emission), bits(row.normalScale),
+                               bits(row.roughness), bits(row.metalness), 0, 0, bits(row.emissionFactor[0]),
+                               bits(row.emissionFactor[1]), bits(row.emissionFactor[2]), 0});
+}
+
 /// Returns the tables (images.glsl), and puts the texels that follow them, tile by tile, into `parts`.
 std::vector<uint32_t> tableWords(const ImageSet& set, std::vector<std::span<const std::byte>>& parts) {
     const Layout layout(set);
     std::vector<uint32_t> words{uint32_t(set.materials().size()), 0, 0, 0};
-    for (const MaterialRow& material : set.materials())
-        words.insert(words.end(), {set.images()[material.image].isShown() ? layout.images[material.image] : 0,
-                                   material.factor, uint32_t(material.wrapU) | uint32_t(material.wrapV) << 8, 0});
+    for (size_t i = 0; i < set.materials().size(); ++i) {
+        const MaterialRow& material = set.materials()[i];
+        words.insert(words.end(),
+                     {set.images()[material.image].isShown() ? layout.images[material.image] : 0, material.factor,
+                      uint32_t(material.wrapU) | uint32_t(material.wrapV) << 8, layout.channels[i]});
+    }
+    for (uint32_t i = 0; i < set.materials().size(); ++i)
+        if (const ChannelRow* const row = set.channelsOf(i)) addChannels(*row, layout, words);
     size_t number = 0;
     for (const ImageSet::Image& image : set.images()) {
         words.insert(words.end(), {image.width, image.height, image.finest, uint32_t(image.levels.size())});

@@ -8,7 +8,8 @@ ShadePass::ShadePass() : pipelines_(kShadeSpirv) {}
 
 Result<void> ShadePass::prepare(FrameResources& resources, const PassConstants& constants, ShadeLight light) {
     PassConstants plain = constants;
-    plain.countSteps = plain.images = false;
+    plain.countSteps = false;
+    plain.images = constants.channels;
     return pipelines_.choose(resources, plain, {uint32_t(light)});
 }
 

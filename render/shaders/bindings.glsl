@@ -16,7 +16,8 @@
 layout(constant_id = 0) const uint kTexelAccess = 1u;
 layout(constant_id = 1) const uint kPoolChunks = 1u;
 layout(constant_id = 2) const uint kChunkShift = 26u;  // log2 of 16-byte texels a chunk
-layout(constant_id = 3) const uint kColour = 0u;  // 1: vertices and cells have some; 2: triangles may have images, too
+// 1: vertices and cells have some; 2: triangles may have images, too; 3: and channels of their materials are shown
+layout(constant_id = 3) const uint kColour = 0u;
 layout(constant_id = 4) const uint kCountSteps = 0u;
 layout(constant_id = 5) const uint kFalseColour = 0u;
 
@@ -35,7 +36,8 @@ layout(set = 0, binding = 9, std430) buffer TileListBlock { uint tileList[]; };
 layout(set = 0, binding = 10) uniform utextureBuffer tileListTexels;
 // A pixel's record: depth (float bits; negative on the cap of a section), normal (octahedral, 16 + 16 bits),
 // colour (RGBA8), and at frame.lightPlane light (8 bits sun, 8 bits sky; of several lights each has a bit of the sun's) or the value of a false colour (float bits,
-// 0 to 1); planes of width * height words.
+// 0 to 1); planes of width * height words. With kColour 3 three more follow the plane at frame.lightPlane: the normal by
+// the channels of the material, roughness and metalness (packHitSurface), and emission (RGB8).
 layout(set = 0, binding = 11, std430) buffer HitBlock { uint hits[]; };
 layout(set = 0, binding = 12) uniform utextureBuffer hitTexels;
 layout(set = 0, binding = 13, std430) writeonly buffer PictureBlock { uint picturePixels[]; };

@@ -10,6 +10,12 @@ PixelHit fetchPixelHit(uint pixel) {
     return PixelHit(abs(depth), depth < 0.0);
 }
 
+// Roughness and metalness of a hit, 8 bits each; bit 16: its material has channels.
+uint packHitSurface(bool areThere, float roughness, float metalness) {
+    return packUnorm4x8(vec4(roughness, metalness, 0.0, 0.0)) | (areThere ? 0x10000u : 0u);
+}
+bool hasHitChannels(uint code) { return (code & 0x10000u) != 0u; }
+
 uint packHitNormal(vec3 n) {
     n /= abs(n.x) + abs(n.y) + abs(n.z);
     vec2 folded = (1.0 - abs(n.yx)) * mix(vec2(-1.0), vec2(1.0), greaterThanEqual(n.xy, vec2(0.0)));

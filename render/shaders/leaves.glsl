@@ -269,6 +269,12 @@ Surface slabSurface(Hit hit, uint faces, uint colourFaces, vec3 direction) {
     return surface;
 }
 
+// Returns the edge of what a sample is averaged over at a hit, in cells of its page's level.
+float footprintEdge(Hit hit) {
+    return kFootprintPixels * pixelEdgeAt(hit.depth) *
+           powerOfTwo(int(kLatticeBits) - int(frame.finestLevel) - hit.pageBits);
+}
+
 // Returns the colour of a hit on a triangle, from its image where it has one. `n`: the triangle's normal.
 vec4 triangleColour(Hit hit, vec3 a, vec3 b, vec3 c, vec3 n, uint colourVertices, vec3 direction) {
     vec3 w = vec3(1.0 - hit.at.x - hit.at.y, hit.at.xy);
@@ -287,10 +293,8 @@ vec4 triangleColour(Hit hit, vec3 a, vec3 b, vec3 c, vec3 n, uint colourVertices
         while (hasImage) {
             ImagedTriangle t = imagedTriangle(first, fetchImagePoint(colourVertices, vertices, hit.corners.y),
                                               fetchImagePoint(colourVertices, vertices, hit.corners.z));
-            float pixelEdge = kFootprintPixels * pixelEdgeAt(hit.depth) *
-                              powerOfTwo(int(kLatticeBits) - int(frame.finestLevel) - hit.pageBits);
-            colour = imageColour(t, t.place + w.y * t.toB + w.z * t.toC, textureSlope(a, b, c, t.toB, t.toC), n,
-                                 direction, pixelEdge);
+            colour = imageColour(t, ImagedPoint(t.place + w.y * t.toB + w.z * t.toC,
+                                                textureSlope(a, b, c, t.toB, t.toC), n, direction, footprintEdge(hit)));
             hasImage = false;
         }
         hasPoints = false;

@@ -4,9 +4,11 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #include "render/shaders/bindings.glsl"
+#include "render/shaders/rays.glsl"
 #include "render/shaders/tiles.glsl"
 #include "render/shaders/hit_records.glsl"
 #include "render/shared/hit_light.h"
+#include "render/shared/channel_light.h"
 #include "render/shared/wireframe.h"
 #include "render/shaders/scene_light.glsl"
 
@@ -64,6 +66,24 @@ vec3 lightOn(vec3 n, float sunlight, float skySeen) {
     return vec3(encodedLight(n, frame.upDirection.xyz, sunlight, skySeen));
 }
 
+vec3 surroundings(vec3 n) {
+    if (frame.hasEnvironment != 0u) return environmentLight(n, frame.environment);
+    return vec3(skylight(n, frame.upDirection.xyz));
+}
+
+// Returns the colour of a surface whose material has channels, as render/host/tile_channels.cpp finds it.
+vec3 channelColour(LitSurface s, vec3 n, vec3 eye, uint seen, float skySeen) {
+    vec3 light = s.emission;
+    DONT_UNROLL for (uint i = 0u; i < frame.lightCount; i++) {
+        vec4 from = lightNumbered(i);
+        float falling = from.w * sunlightOf(n, from.xyz, float(seen >> i & 1u)) * (0.5 + 0.5 * skySeen);
+        if (falling > 0.0) light += falling * reflectedPart(s, n, from.xyz, eye);
+    }
+    ReflectedParts parts = reflectedParts(s, n, eye);
+    light += skySeen * (parts.matt * surroundings(n) + parts.mirrored * surroundings(seenDirection(s, n, eye)));
+    return colourOfLight(light);
+}
+
 void main() {
     uvec2 pixel;
     uint tile;
@@ -99,6 +119,17 @@ void main() {
     vec3 colour = frame.shadingMode == kShadeNormals ? turnedBy(frame.rotation.xyz, frame.rotation.w, n) * 0.5 + 0.5
                   : frame.shadingMode == kShadeUnlit ? albedo
                                                      : albedo * lightOn(n, sunlightOfAll(n, seen), skySeen);
+    bool hasChannels = false;
+    uint behind = frame.lightPlane + 1u;
+    if (kColour == 3u) hasChannels = hasHitChannels(fetchHit((behind + 1u) * plane + at));
+    while (hasChannels) {
+        vec2 surface = unpackUnorm4x8(fetchHit((behind + 1u) * plane + at)).xy;
+        vec3 emission = lightOfColour(unpackUnorm4x8(fetchHit((behind + 2u) * plane + at)).xyz);
+        colour = channelColour(LitSurface(lightOfColour(albedo), surface.x, surface.y, emission),
+                               unpackHitNormal(fetchHit(behind * plane + at)), -rayAt(vec2(pixel) + 0.5).direction,
+                               seen, skySeen);
+        hasChannels = false;
+    }
     if (wired) {
         float line = uintBitsToFloat(fetchHit(frame.lightPlane * plane + at));
         colour = mix(colour, line < 0.0 ? leafInk() : triangleInk(), abs(line));

@@ -13,6 +13,7 @@ const uint kHitBy = kHitByCamera;
 #include "render/shaders/hit_records.glsl"
 #include "render/shaders/wireframe.glsl"
 #include "render/shared/hit_light.h"
+#include "render/shaders/channels.glsl"
 
 layout(constant_id = 6) const uint kSections =
     0u;  // 0: none; 1: planes that cut; 2: with filled caps; 3: of closed parts
@@ -206,6 +207,14 @@ void main() {
     hits[at] = floatBitsToUint(onCap ? -hit.depth : hit.depth);
     hits[plane + at] = packHitNormal(normal);
     if (kColour != 0u) hits[2u * plane + at] = packUnorm4x8(surface.colour);
+    if (kColour == 3u) {
+        HitChannels c = HitChannels(false, normal, 0.0, 0.0, vec3(0.0));
+        if (!onCap) c = channelsAt(hit, normal, ray.direction);
+        uint behind = frame.lightPlane + 1u;
+        hits[behind * plane + at] = packHitNormal(c.normal);
+        hits[(behind + 1u) * plane + at] = packHitSurface(c.areThere, c.roughness, c.metalness);
+        hits[(behind + 2u) * plane + at] = packUnorm4x8(vec4(colourOfLight(c.emission), 0.0));
+    }
     if (kFalseColour != 0u) {
         float shown = falseColour(hit, work);
         bool wired = frame.shadingMode == kShadeWireframe;

@@ -21,6 +21,18 @@ constexpr uint64_t kMostRaysAtOnce = 8 * kPartRays;
 constexpr double kStepSeconds = 0.04;
 constexpr uint64_t kFewestStepRays = 1 << 12;
 
+// Planes of a pixel's record behind the others, where channels of materials are shown.
+constexpr uint32_t kChannelPlanes = 3;
+
+bool showsChannels(const Residency& residency, const FrameRequest& request) {
+    return residency.hasColour() && residency.hasChannels() && request.shading.channels &&
+           request.shading.mode == ShadingMode::Lit;
+}
+
+uint32_t hitPlanesOf(const FrameRequest& request, const PassConstants& constants) {
+    return hitPlanes(request, constants.colour) + (constants.channels ? kChannelPlanes : 0);
+}
+
 }  // namespace
 
 PassConstants Renderer::View::constantsFor(const Layer& layer, const FrameRequest& request) const {
@@ -31,6 +43,7 @@ PassConstants Renderer::View::constantsFor(const Layer& layer, const FrameReques
         c.chunkShift = poolOf(*residency).chunkShift();
         c.colour = residency->hasColour();
         c.images = residency->images() != nullptr;
+        c.channels = showsChannels(*residency, request);
     }
     c.falseColour = hasHitNumbers(request.shading.mode);
     c.countSteps = request.countSteps || showsWork(request.shading.mode);
@@ -38,8 +51,8 @@ PassConstants Renderer::View::constantsFor(const Layer& layer, const FrameReques
 }
 
 Result<void> Renderer::View::checkLimits(const Layer& layer, const FrameRequest& request) const {
-    const uint64_t words = uint64_t{request.width} * request.height *
-                           hitPlanes(request, layer.residency != nullptr && layer.residency->hasColour());
+    const uint64_t words =
+        uint64_t{request.width} * request.height * hitPlanesOf(request, constantsFor(layer, request));
     const Device& device = *shared->device;
     const VkPhysicalDeviceLimits& limits = device.limits();
     uint64_t most = limits.maxStorageBufferRange / 4;
@@ -82,7 +95,7 @@ Result<void> Renderer::View::prepare(Frame& frame, size_t i) {
     const PassConstants& constants = drawing.constants;
     FrameResources& resources = *drawing.resources;
     VCP_TRY(checkLimits(layer, request));
-    VCP_TRY(resources.resize({request.width, request.height}, hitPlanes(request, constants.colour)));
+    VCP_TRY(resources.resize({request.width, request.height}, hitPlanesOf(request, constants)));
     resources.setBackground(backgroundRows(request));
     VCP_TRY(prepareTable(layer, drawing));
     drawing.imagesVersion = layer.residency != nullptr ? layer.residency->imagesVersion() : 0;

@@ -8,6 +8,7 @@ Result<ShardImages> coarseImages(const ByteReader& reader, const FileHeader& hea
     VCP_TRY_ASSIGN(const auto all, readImageTables(reader, header.images));
     ShardImages coarse;
     coarse.tables.materials = all.materials;
+    coarse.tables.channels = all.channels;
     for (const ImageRow& image : all.images) {
         const auto levels = levelsOf(image);
         const auto finest =

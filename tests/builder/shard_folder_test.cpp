@@ -9,6 +9,7 @@
 
 #include "builder/build.h"
 #include "octree/vcp_verify.h"
+#include "tests/support/channelled_floor.h"
 #include "tests/support/mesh_files.h"
 #include "tests/support/test_folder.h"
 #include "tests/support/test_meshes.h"
@@ -73,6 +74,17 @@ TEST_F(ShardFolder, OfAScanWithImages) {
     build({folder_ / "walls.obj"}, 0.02);
     // Pages are so small that each with children begins a shard.
     EXPECT_GT(split(4000).shards, 3u);
+    expectWhole();
+}
+
+TEST_F(ShardFolder, OfAScanWhoseMaterialsHaveChannels) {
+    test::ChannelledFloor floor;
+    floor.colour = [](uint32_t x, uint32_t y) { return x * 2 | y * 3 << 8; };
+    floor.normals = [](uint32_t x, uint32_t) { return test::normalTexel(std::sin(0.3 * x) * 0.5, 0, 0.85); };
+    floor.emission = [](uint32_t x, uint32_t y) { return x > 40 && y > 20 ? 0xffffffu : 0u; };
+    floor.write(folder_.path());
+    build({folder_ / "floor.gltf"}, 0.02);
+    EXPECT_GT(split(4000).shards, 1u);
     expectWhole();
 }
 

@@ -63,7 +63,7 @@ inline void hashImages(std::vector<std::byte>& file, ImagesPlace& place) {
         if (std::min(row.width, row.height) < 1 || std::max(row.width, row.height) > kMaxImageEdge) return;
         tiles += tilesOf(levelsOf(row));
     }
-    at += uint64_t{place.materials} * sizeof(MaterialRow);
+    at += uint64_t{place.materials} * sizeof(MaterialRow) + uint64_t{place.channels} * sizeof(ChannelRow);
     const uint64_t end = at + tiles * sizeof(TileRow);
     if (end > file.size()) return;
     for (; at < end; at += sizeof(TileRow)) {

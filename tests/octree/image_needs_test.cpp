@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <set>
 
 #include <gtest/gtest.h>
@@ -115,6 +116,25 @@ TEST_F(ImageNeeds, AreAllThatFootprintsRead) {
         });
     }
     EXPECT_GT(left, 60 * pieces_->count() / 2) << "most pieces are of the other image, or elsewhere";
+}
+
+TEST_F(ImageNeeds, ChannelsAreNeededWhereTheColourIs) {
+    const Placed sheet(test::sheet(1, 2, 3, 5), 0.4, 0.1);
+    ImageTables tables = pieces_->tables();
+    ASSERT_EQ(imageNeeds(tables, sheet.page).size(),
+              size_t(std::ranges::count_if(imageNeeds(tables, sheet.page),
+                                           [](const ImageNeed& need) { return need.image == 0; })));
+    tables.channels.resize(tables.materials.size());
+    tables.channels[0] = {.isGiven = 1, .normals = 2, .roughness = 1};
+    float colour = std::numeric_limits<float>::infinity(), normals = colour;
+    for (const ImageNeed& need : imageNeeds(tables, sheet.page)) {
+        float& least = need.image == 0 ? colour : normals;
+        least = std::min(least, need.texelsPerCell);
+        EXPECT_FALSE(need.blocks.empty());
+    }
+    // The image of normals is 700 x 1100 texels, that of the colour 1900 x 1300.
+    EXPECT_GT(normals, colour * 0.3f);
+    EXPECT_LT(normals, colour);
 }
 
 TEST_F(ImageNeeds, WhatIsNotThereIsSeenInACoarserLevel) {

@@ -359,7 +359,7 @@ TEST_F(VcpFile, WrongMagicAndVersion) {
     EXPECT_EQ(past.error().code, ErrorCode::Unsupported);
     EXPECT_EQ(
         past.error().line(),
-        "memory.vcp: header: byte 8: file version 2 is not known; this program reads versions 3 to 8: build it again");
+        "memory.vcp: header: byte 8: file version 2 is not known; this program reads versions 3 to 9: build it again");
 }
 
 TEST_F(VcpFile, HeaderLiesAreFound) {
@@ -408,7 +408,8 @@ TEST_F(VcpFile, HeaderLiesAreFound) {
     expectRefused(fmt::format("byte {}: more triangles without area", offsetof(FileHeader, degenerateTriangles)),
                   [](F& f) { f.header().degenerateTriangles = 1; });
     expectRefused("byte 776: reserved", [](F& f) { f.bytes[offsetof(FileHeader, images)] = std::byte{1}; });
-    expectRefused("byte 808: reserved", [](F& f) { f.bytes[sizeof(FileHeader)] = std::byte{1}; });
+    expectRefused("byte 808: reserved", [](F& f) { f.header().images.channels = 1; });
+    expectRefused("byte 816: reserved", [](F& f) { f.bytes[sizeof(FileHeader)] = std::byte{1}; });
     expectRefused("byte 4095: reserved", [](F& f) { f.bytes[4095] = std::byte{1}; });
     expectRefused("reserved", [](F& f) { f.header().paper.packing = 1; });
     expectRefused("rows behind the level table", [](F& f) { f.header().level[2].pages = 1; });

@@ -120,6 +120,9 @@ void addImages(CLI::App& app, BuildOptions& options) {
         "--images,!--no-images", [&options](int64_t times) { options.keepImages = times > 0; },
         "Keep the images of materials, too, as sharp as they are, with their place on the triangles [on, but "
         "with --error]");
+    app.add_flag(
+        "--channels,!--no-channels", options.channels,
+        "Keep with them what materials have beside their colour: normals, roughness, metalness, emission [on]");
     addParsed(
         app, "--colour-quality,--color-quality", options.imageQuality, imageQualityNamed,
         "source, lossless or 1 to 100",

@@ -157,7 +157,16 @@ Result<int> run(const BuildCommand& command) {
         return Error{.code = ErrorCode::Usage, .message = "--output is required; only --dry-run does without"};
     const std::string folder = command.shardBytes > 0 ? command.output : std::string();
     options.output = command.output.empty() ? "." : folder.empty() ? command.output : wholeFileOf(folder);
-    if (!folder.empty() && !command.dryRun) VCP_TRY(checkShardFolder({.folder = folder, .inputs = options.inputs}));
+    if (!folder.empty() && !command.dryRun) {
+        VCP_TRY(checkShardFolder({.folder = folder, .inputs = options.inputs}));
+        std::error_code ignored;
+        if (!command.overwrite && std::filesystem::exists(options.output, ignored))
+            return Error{.code = ErrorCode::Usage,
+                         .message =
+                             "is there, where the file that is cut would be built: cut it with `vcp shard` if an "
+                             "interrupted build left it, move it away, or let --overwrite replace it",
+                         .file = options.output.string()};
+    }
     options.resume = command.resume;
     options.overwrite = command.overwrite;
     options.checkpointSeconds = command.checkpointSeconds;

@@ -92,6 +92,7 @@ Json toJson(const std::string& file, const Dataset& dataset, uint64_t shards) {
             {"colour_stored_bytes", bytes.colour},
             {"images", h.images.images},
             {"materials", h.images.materials},
+            {"channels", h.images.channels > 0},
             {"images_stored_bytes", h.images.bytes},
             {"bounds_min", Json::array({h.boundsMin[0], h.boundsMin[1], h.boundsMin[2]})},
             {"bounds_max", Json::array({h.boundsMax[0], h.boundsMax[1], h.boundsMax[2]})},
@@ -129,7 +130,8 @@ std::string bytesLine(const Dataset& dataset) {
     const ImagesPlace& images = dataset.header.images;
     if (dataset.hasImages())
         line += fmt::format(", {} of {} in {}", formatBytes(images.bytes), formatCount(images.images, "image"),
-                            formatCount(images.materials, "material"));
+                            formatCount(images.materials, "material")) +
+                (images.channels > 0 ? " with channels" : "");
     return line + '\n';
 }
 

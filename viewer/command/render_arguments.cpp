@@ -99,6 +99,8 @@ void addRenderSettings(CLI::App& app, RenderSettings& settings) {
         "to a pixel), steps, cells, fetches (work of each ray)")
         ->type_name(fmt::format("MODE:{{{}}}", fmt::join(kShadingNames, ",")))
         ->default_str("lit");
+    app.add_flag("!--plain", settings.shading.channels,
+                 "Plain light on all colours, where materials have normals, roughness, metalness or emission, too");
     app.add_flag("--shadows", settings.shading.shadows, "Light casts hard shadows");
     app.add_option("--occlusion", settings.shading.occlusionRays,
                    "Corners and folds are darker (ambient occlusion), by so many rays a pixel; 8 without N [off]")
@@ -114,7 +116,8 @@ void addRenderSettings(CLI::App& app, RenderSettings& settings) {
     app.add_flag("--caps{closed}", settings.caps,
                  "Fill what sections cut open of closed parts, and draw the rest as lines; --caps=all: fill as if all "
                  "were closed")
-        ->transform(CLI::Transformer(std::map<std::string, Caps>{{"closed", Caps::Closed}, {"all", Caps::All}}));
+        ->transform(CLI::Transformer(std::map<std::string, Caps>{{"closed", Caps::Closed}, {"all", Caps::All}})
+                        .description("{closed,all}"));
     beginGroup(app, help_group::kLimits);
     app.add_option("--error-pixels", settings.errorPixels,
                    "Error that may be seen, in pixels: detail is loaded until the picture errs by no more")

@@ -172,6 +172,8 @@ void Interface::layOutLight() {
     static_assert(std::size(kNames) == kShadingNames.size());
     if (comboRow(*look_, "##shading", kNames, mode, {"What colours show", "M"}))
         shading.mode = static_cast<ShadingMode>(mode);
+    if (viewer.hasChannels())
+        switchRow(*look_, "Materials", shading.channels, {"Their normals, roughness, metalness and emission", ""});
     // On files that are drawn without shadows, the switch does nothing.
     ImGui::BeginDisabled(!viewer.whyWithout(ViewerAction::ToggleShadows).empty());
     switchRow(*look_, "Shadows", shading.shadows, {"Light is cast from one side", "S"});

@@ -12,6 +12,7 @@
 
 #include "builder/mesh/gltf/draco.h"
 #include "builder/mesh/gltf/glb.h"
+#include "builder/mesh/gltf/gltf_materials.h"
 #include "builder/mesh/gltf/gltf_primitive.h"
 #include "builder/mesh/gltf/gltf_scene.h"
 #include "builder/stream/chunk_room.h"
@@ -108,16 +109,7 @@ private:
             VCP_TRY_ASSIGN(auto image, imageOf(i, bytes));
             images.push_back(std::move(image));
         }
-        for (const GltfMaterial& from : document_.materials) {
-            Material material;
-            material.name = from.name;
-            material.wrapU = from.wrapU;
-            material.wrapV = from.wrapV;
-            if (from.image) material.image = images[*from.image];
-            material.ignoresAlpha = from.alphaMode == GltfAlpha::Opaque;
-            material.mask = maskOf(from, material.image);
-            materials_.push_back(std::move(material));
-        }
+        materials_ = materialsOf(document_, images);
         eachPrimitive([&](const GltfPlacement&, const GltfPrimitive& primitive) {
             info_.hasMaterials = info_.hasMaterials || hasImage(primitive) || isCutOut(primitive);
         });
@@ -128,22 +120,7 @@ private:
     bool hasImage(const GltfPrimitive& primitive) const {
         const bool hasUv = primitive.draco ? primitive.draco->uv.has_value() : primitive.uv.has_value();
         return hasUv && primitive.material && *primitive.material < materials_.size() &&
-               materials_[*primitive.material].image.exists();
-    }
-
-    // With a mask, what is there follows from the product of the image's alpha and the factor's.
-    static MaskRule maskOf(const GltfMaterial& from, const ImageSource& image) {
-        MaskRule rule;
-        if (from.alphaMode == GltfAlpha::Opaque) return rule;
-        rule.image = image;
-        rule.sparesGlass = from.alphaMode == GltfAlpha::Blend;
-        if (from.alphaMode == GltfAlpha::Blend) return rule;
-        constexpr double kAboveAll = 2;
-        if (from.alphaCutoff > 0)
-            rule.cutoff = from.alpha > 0 ? from.alphaCutoff / from.alpha : kAboveAll;
-        else
-            rule.image = {};
-        return rule;
+               materials_[*primitive.material].hasImages();
     }
 
     // Whether nothing is left of a primitive, with or without an image.
@@ -341,7 +318,7 @@ private:
             chunk.uvs.assign(chunk.triangles.size(), {});
             return;
         }
-        const auto& matrix = document_.materials[*primitive.material].uvMatrix;
+        const auto& matrix = document_.materials[*primitive.material].texture.uvMatrix;
         for (auto& corners : chunk.uvs)
             for (glm::vec2& uv : corners) {
                 const glm::dvec3 at(uv, 1);

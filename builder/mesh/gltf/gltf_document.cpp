@@ -233,8 +233,8 @@ private:
         p.material = f.index("material", document_.materials.size());
         if (!check_.ok()) return;
         std::string uvName;
-        if (p.material && document_.materials[*p.material].image) {
-            uvName = fmt::format("TEXCOORD_{}", document_.materials[*p.material].texCoord);
+        if (p.material && document_.materials[*p.material].hasCoordinates) {
+            uvName = fmt::format("TEXCOORD_{}", document_.materials[*p.material].texture.texCoord);
             p.uv = attributes.index(uvName.c_str(), accessors);
         }
         readDraco(f, uvName, p);

@@ -78,17 +78,36 @@ struct GltfAccessor {
 
 enum class GltfAlpha : uint8_t { Opaque, Mask, Blend };
 
+/// An image, and where it lies.
+struct GltfTexture {
+    std::optional<uint32_t> image;
+    uint32_t texCoord = 0;
+    Wrap wrapU = Wrap::Repeat, wrapV = Wrap::Repeat;
+    /// KHR_texture_transform: uv becomes uvMatrix * (u, v, 1), row by row.
+    std::array<glm::dvec3, 2> uvMatrix{glm::dvec3(1, 0, 0), glm::dvec3(0, 1, 0)};
+
+    [[nodiscard]] bool liesAs(const GltfTexture& other) const {
+        return texCoord == other.texCoord && wrapU == other.wrapU && wrapV == other.wrapV && uvMatrix == other.uvMatrix;
+    }
+};
+
+/// What a material has beside its base colour: numbers of images that lie as its texture does, and factors.
+struct GltfChannels {
+    std::optional<uint32_t> normals, surface, emission;
+    bool lacksSurface = false, lacksEmission = false;  ///< the image that the factors belong to was left out
+    double normalScale = 1, roughness = 1, metalness = 1;
+    std::array<double, 3> emissionFactor{0, 0, 0};
+};
+
 struct GltfMaterial {
     std::string name;
     Rgba8 factor = kWhite;  ///< base colour, sRGB encoded
     double alpha = 1;       ///< of the base colour
     GltfAlpha alphaMode = GltfAlpha::Opaque;
     double alphaCutoff = 0.5;
-    std::optional<uint32_t> image;
-    uint32_t texCoord = 0;
-    Wrap wrapU = Wrap::Repeat, wrapV = Wrap::Repeat;
-    /// KHR_texture_transform: uv becomes uvMatrix * (u, v, 1), row by row.
-    std::array<glm::dvec3, 2> uvMatrix{glm::dvec3(1, 0, 0), glm::dvec3(0, 1, 0)};
+    GltfTexture texture;          ///< of the base colour; without one it says where the channels lie
+    bool hasCoordinates = false;  ///< some image lies over its triangles
+    GltfChannels channels;
 };
 
 struct GltfImage {

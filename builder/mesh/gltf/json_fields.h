@@ -36,6 +36,10 @@ public:
 
     void fail(std::string what) const { check_.fail(where_, std::move(what)); }
 
+    [[nodiscard]] const Json& object() const { return object_; }
+    /// Returns those of an object in this one.
+    [[nodiscard]] JsonFields within(const Json& object) const { return {object, where_, check_}; }
+
     [[nodiscard]] const Json* find(const char* key) const {
         if (!object_.is_object()) return nullptr;
         const auto found = object_.find(key);

@@ -68,6 +68,33 @@ TEST_F(ObjMaterialFiles, TexturesComeWithCoordinatesFromTheTop) {
     EXPECT_EQ(mesh.uvs[3], (Uvs{glm::vec2(0), {2.5f, 1}, glm::vec2(0)})) << "what does not exist is 0";
 }
 
+TEST_F(ObjMaterialFiles, ChannelsLieWhereTheColourDoes) {
+    for (const char* name : {"a.png", "n.png", "r.png", "e.png"}) write(name, "");
+    write("m.mtl",
+          "newmtl all\nKe 1 0.5 0\nPr 0.5\nmap_Kd -s 2 2 1 a.png\nnorm -s 2 2 1 -bm 0.5 n.png\nmap_Pr -s 2 2 1 "
+          "r.png\nmap_Ke -s 2 2 1 e.png\nnewmtl elsewhere\nmap_Kd a.png\nnorm -s 2 2 1 n.png\nPm 1\nnewmtl "
+          "alone\nnorm -o 0.5 0 0 n.png\nnewmtl bare\nKe 1 1 1\nPm 1\nnewmtl metal\nmap_Kd a.png\nmap_Pr r.png\nPm "
+          "1\nmap_Pm r.png\n");
+    const Painted mesh = read("mtllib m.mtl\n" + kTexturedSquare + "usemtl alone\nf 1/1 2/2 3/3\n");
+    ASSERT_EQ(mesh.list.size(), 5u);
+    const MaterialChannels& all = mesh.list[0].channels;
+    EXPECT_EQ(all.normals.path, folder_ / "n.png");
+    EXPECT_EQ(all.surface.path, folder_ / "r.png");
+    EXPECT_EQ(all.emission.path, folder_ / "e.png");
+    EXPECT_EQ(all.normalScale, 0.5f);
+    EXPECT_EQ(all.roughness, 0.5f);
+    EXPECT_EQ(all.metalness, 0.0f);
+    EXPECT_EQ(all.emissionFactor, glm::vec3(1, 0.5f, 0));
+    EXPECT_FALSE(mesh.list[1].channels.exist());
+    EXPECT_TRUE(mesh.list[2].channels.normals.exists());
+    EXPECT_FALSE(mesh.list[2].image.exists());
+    EXPECT_FALSE(mesh.list[3].channels.exist()) << "it has no image";
+    EXPECT_EQ(mesh.list[4].channels.metalness, 0.0f);
+    EXPECT_EQ(mesh.warnings.size(), 3u) << "an image elsewhere, metalness beside roughness, an image of metalness";
+    ASSERT_EQ(mesh.uvs.size(), 1u);
+    EXPECT_EQ(mesh.uvs[0][0], glm::vec2(0.5f, 1)) << "they lie where the image of normals says";
+}
+
 TEST_F(ObjMaterialFiles, MasksAreMapDOrTheImageItself) {
     write("a.png", "");
     write("m.png", "");

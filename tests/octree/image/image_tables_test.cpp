@@ -170,6 +170,94 @@ TEST_F(ImageFile, LiesBehindTheRightHashAreRefused) {
     expectRefused(kTiles + offsetof(TileRow, reserved), 1, "reserved bytes must be zero");
 }
 
+/// The same file with channels: the first material has all, the second none, the third emission alone.
+class ChannelFile : public ImageFile {
+protected:
+    void SetUp() override {
+        for (const auto& [width, height] : {std::pair(5u, 3u), std::pair(70u, 2u), std::pair(1u, 1u)})
+            stored_.add(test::randomImage(width, height, width));
+        stored_.tables.materials = {{.image = 0}, {.image = 2}, {.image = 1, .wrapV = ImageWrap::Mirror}};
+        stored_.tables.channels = {{.isGiven = 1,
+                                    .normals = 2,
+                                    .surface = 3,
+                                    .emission = 1,
+                                    .normalScale = -0.5f,
+                                    .roughness = 0.25f,
+                                    .metalness = 1,
+                                    .emissionFactor = {1, 0, 20}},
+                                   {},
+                                   {.isGiven = 1, .roughness = 1, .emissionFactor = {0.5f, 0.5f, 0.5f}}};
+        test::writeImageFile(folder_ / "channels.vcp", stored_);
+        if (HasFatalFailure()) return;
+        const std::string text = contentOf(folder_ / "channels.vcp");
+        bytes_.resize(text.size());
+        std::memcpy(bytes_.data(), text.data(), text.size());
+    }
+};
+
+TEST_F(ChannelFile, IsReadBack) {
+    const TableFile file(bytes_);
+    ASSERT_TRUE(verifyFile(file).ok()) << verifyFile(file).error().line();
+    const auto dataset = readDataset(file);
+    ASSERT_TRUE(dataset.ok());
+    EXPECT_EQ(dataset->header.version, kChannelsFileVersion);
+    EXPECT_EQ(dataset->header.images.channels, 3u);
+    const auto tables = readImageTables(file, dataset->header.images);
+    ASSERT_TRUE(tables.ok()) << tables.error().line();
+    ASSERT_EQ(tables->channels.size(), 3u);
+    EXPECT_EQ(std::memcmp(tables->channels.data(), stored_.tables.channels.data(), 3 * sizeof(ChannelRow)), 0);
+    std::vector<uint32_t> images;
+    forEachImage(*tables, 0, [&](uint32_t image) { images.push_back(image); });
+    EXPECT_EQ(images, (std::vector<uint32_t>{0, 1, 2, 0}));
+    // Channels are shown with all of their images.
+    const auto set = readAllImages(file, dataset->header.images);
+    ASSERT_TRUE(set.ok() && set->hasChannels());
+    ASSERT_NE(set->channelsOf(0), nullptr);
+    EXPECT_EQ(set->channelsOf(0)->normalScale, -0.5f);
+    EXPECT_EQ(set->channelsOf(1), nullptr);
+    EXPECT_NE(set->channelsOf(2), nullptr);
+    const ImageSet without(*tables);
+    EXPECT_EQ(without.channelsOf(0), nullptr);
+    EXPECT_NE(without.channelsOf(2), nullptr) << "it has no images";
+}
+
+TEST_F(ChannelFile, EveryTruncationAndEveryBitFlipIsFound) {
+    for (size_t bytes = 0; bytes < bytes_.size(); ++bytes)
+        ASSERT_FALSE(verifyFile(TableFile({bytes_.begin(), bytes_.begin() + std::ptrdiff_t(bytes)})).ok()) << bytes;
+    TableFile file(bytes_);
+    for (size_t bit = 8 * place().offset; bit < 8 * (place().offset + stored_.tables.bytes()); ++bit) {
+        file.bytes[bit / 8] ^= std::byte{1} << int(bit % 8);
+        ASSERT_FALSE(verifyFile(file).ok()) << bit;
+        file.bytes[bit / 8] = bytes_[bit / 8];
+    }
+}
+
+TEST_F(ChannelFile, LiesBehindTheRightHashAreRefused) {
+    constexpr uint64_t kFirst = 3 * sizeof(ImageRow) + 3 * sizeof(MaterialRow), kRow = sizeof(ChannelRow);
+    expectRefused(kFirst + offsetof(ChannelRow, isGiven), 2, "channels of material 0: byte");
+    expectRefused(kFirst + kRow + offsetof(ChannelRow, roughness), 1, "there should be none");
+    expectRefused(kFirst + offsetof(ChannelRow, normals), 4, "name an image that there is not");
+    expectRefused(kFirst + offsetof(ChannelRow, surface) + 3, 255, "name an image that there is not");
+    expectRefused(kFirst + offsetof(ChannelRow, emission), 77, "name an image that there is not");
+    // The highest bytes of single-precision numbers: their signs, and infinity.
+    expectRefused(kFirst + offsetof(ChannelRow, normalScale) + 3, 0x7f, "the scale of their normals is out of range");
+    expectRefused(kFirst + offsetof(ChannelRow, roughness) + 3, 0xbf, "their roughness is out of range");
+    expectRefused(kFirst + offsetof(ChannelRow, metalness) + 3, 0x40, "their metalness is out of range");
+    expectRefused(kFirst + offsetof(ChannelRow, emissionFactor) + 3, 0x7f, "their emission is out of range");
+    expectRefused(kFirst + offsetof(ChannelRow, emissionFactor) + 11, 0xc1, "their emission is out of range");
+}
+
+TEST_F(ChannelFile, AWrongNumberOfRowsIsRefused) {
+    const uint64_t end = bytes_.size() - sizeof(CommitRecord);
+    ImagesPlace wrong = place();
+    EXPECT_EQ(wrongPlace(wrong, 8192, end), "");
+    wrong.channels = 2;
+    EXPECT_NE(wrongPlace(wrong, 8192, end), "");
+    wrong = place();
+    wrong.reserved = 1;
+    EXPECT_NE(wrongPlace(wrong, 8192, end), "");
+}
+
 TEST_F(ImageFile, AWrongPlaceIsRefused) {
     const uint64_t begin = 8192, end = bytes_.size() - sizeof(CommitRecord);
     EXPECT_EQ(wrongPlace(place(), begin, end), "");

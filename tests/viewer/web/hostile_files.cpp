@@ -127,7 +127,8 @@ void changeStored(Bytes& input, std::mt19937_64& random) {
 
 /// Moves the section of images in a file to another place: its tiles say where they are.
 void moveImages(std::span<std::byte> section, ImagesPlace& place, uint64_t offset) {
-    size_t at = place.images * sizeof(ImageRow) + place.materials * sizeof(MaterialRow);
+    size_t at =
+        place.images * sizeof(ImageRow) + place.materials * sizeof(MaterialRow) + place.channels * sizeof(ChannelRow);
     for (uint64_t end = section.size(); at + sizeof(TileRow) <= end; at += sizeof(TileRow)) {
         TileRow row;
         std::memcpy(&row, &section[at], sizeof row);

@@ -1,6 +1,7 @@
 // Images of a file in the viewer for browsers, without a browser: image_test.mjs WEB_FOLDER FOLDER
 // FOLDER: textured_scene.mjs' mesh as lossless.vcp and, with JPEGs, as jpeg.vcp; VIEW.json, VIEW.pfm, VIEW.png: a
-// camera, and what the program sees from there of the first one, 320 x 200, a ray a pixel, unlit.
+// camera, and what the program sees from there of the first one, 320 x 200, a ray a pixel, unlit; channels.vcp: the mesh
+// with channels, channels.pfm and .png: what it sees of that one from close.json, lit.
 import assert from 'node:assert/strict';
 import fs from 'node:fs';
 import path from 'node:path';
@@ -96,6 +97,20 @@ for (const name of ['whole', 'close']) await check(`colours are the native ones:
     console.log(`   ${differ} of ${counted} pixels differ by more than 1 of 255, at most by ${most}`);
     assert.ok(counted > 30000 && differ <= counted / 1000);
     assert.ok(compareColours(vertices, theirs, 1, isHit).differ > counted / 2, 'vertices have other colours');
+});
+
+await check('channels are lit as the program lights them, by others, too', async () => {
+    const bytes = read('channels.vcp'), scan = await Scan.of(bytes), view = viewOf('close', { mode: 0 });
+    await scan.settle(view);
+    assert.deepEqual(scan.problems, []);
+    const depth = readDepth(path.join(folder, 'channels.pfm'), width, height), theirs = readPicture(path.join(folder, 'channels.png'));
+    const ours = scan.draw(), { differ, counted, most } = compareColours(ours, theirs, 2, i => Number.isFinite(depth[i]));
+    console.log(`   ${differ} of ${counted} pixels differ by more than 2 of 255, at most by ${most}`);
+    assert.ok(counted > 30000 && differ <= counted / 500);
+    const other = await CasterHere.beside(scan.module, 64 << 20), begun = scan.module.beginSample(0);
+    const part = other.caster.fit(scan.module, begun.rows, { first: 0, count: begun.bands });
+    const done = await other.caster.cast(scan.module, { view, sample: 0, begun, shows: true }, part);
+    assert.ok(done.pixels.length > 0 && same(done.pixels, ours.subarray(0, done.pixels.length)));
 });
 
 await check('the first picture does not wait for images; no byte is asked for twice', async () => {

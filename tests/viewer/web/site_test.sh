@@ -61,6 +61,12 @@ cmp scan.vcp empty/scan.vcp
 [ -z "$(find . -name '*unfinished*')" ] || fail "left: $(find . -name '*unfinished*')"
 
 "$vcp" shard scan.vcp -o shards --size 64K --progress none >/dev/null
+"$vcp" build scan.ply -o built --shards 64K --progress none >/dev/null
+diff -r shards built
+[ ! -e built.whole.vcp ] || fail "the file that was cut is left"
+echo precious >built.whole.vcp
+expect 2 "is there" "$vcp" build scan.ply -o built --shards 64K --progress none
+grep -q precious built.whole.vcp || fail "a file that is not ours was replaced"
 "$vcp" publish shards -o parted --viewer viewer >/dev/null
 cmp shards/manifest.vcps parted/scan.vcp
 for shard in shards/*.vcp; do cmp "$shard" "parted/$(basename "$shard")"; done

@@ -1,6 +1,7 @@
-// Writes a mesh with images: textured_scene.mjs FOLDER EDGE WIDTH
+// Writes a mesh with images: textured_scene.mjs FOLDER EDGE WIDTH [channels]
 // A wavy floor of EDGE x EDGE squares, which shows tiles.png, WIDTH texels wide, 1.5 times along x and once along z, and
-// a wall of two triangles behind it, which shows wall.png, whose edges are no powers of two.
+// a wall of two triangles behind it, which shows wall.png, whose edges are no powers of two. With channels, the floor has
+// normals and is smooth, and the wall shines.
 import fs from 'node:fs';
 import path from 'node:path';
 import zlib from 'node:zlib';
@@ -61,10 +62,12 @@ function floor(edge) {
     return lines;
 }
 
-const folder = process.argv[2], [edge, width] = process.argv.slice(3).map(Number);
+const folder = process.argv[2], [edge, width] = process.argv.slice(3, 5).map(Number), hasChannels = process.argv[5] === 'channels';
 fs.writeFileSync(path.join(folder, 'tiles.png'), png(width, width * 3 / 4, tiles));
 fs.writeFileSync(path.join(folder, 'wall.png'), png(Math.floor(width * 0.3), Math.floor(width * 0.2), wall));
-fs.writeFileSync(path.join(folder, 'textured.mtl'), 'newmtl floor\nmap_Kd tiles.png\nnewmtl wall\nmap_Kd wall.png\n');
+if (hasChannels) fs.writeFileSync(path.join(folder, 'normals.png'), png(256, 256, (x, y) => [wave(x, 3) * 0.4 + 77, wave(y, 4) * 0.4 + 77, 230]));
+fs.writeFileSync(path.join(folder, 'textured.mtl'), ['newmtl floor', 'map_Kd tiles.png', ...hasChannels ? ['norm normals.png', 'Pr 0.4'] : [],
+    'newmtl wall', 'map_Kd wall.png', ...hasChannels ? ['map_Ke wall.png', 'Ke 0.3 0.2 0.1'] : [], ''].join('\n'));
 const back = ['v 0 -0.2 0', 'vt 0 0', 'v 4 -0.2 0', 'vt 1 0', 'v 4 2 0', 'vt 1 1', 'v 0 2 0', 'vt 0 1', 'usemtl wall', 'f -4/-4 -3/-3 -2/-2',
     'f -4/-4 -2/-2 -1/-1'];
 fs.writeFileSync(path.join(folder, 'textured.obj'), ['mtllib textured.mtl', ...floor(edge), ...back, ''].join('\n'));

@@ -20,9 +20,11 @@ for view in whole close; do
 done
 "$make_scan" --triangles 10000 --colour -o small.ply
 "$vcp" build small.ply -o small.vcp --overwrite --progress none
-mkdir -p small textured
+mkdir -p small textured channels
 "$node" "$here/textured_scene.mjs" small 20 96
 "$node" "$here/textured_scene.mjs" textured 200 1024
+"$node" "$here/textured_scene.mjs" channels 60 512 channels
+"$vcp" build channels/textured.obj -o textured/channels.vcp --overwrite --progress none --colour-quality lossless
 echo '{ "position": [2, 2.2, 5], "target": [2, 0.4, 0.5], "fov_degrees": 34 }' >textured/whole.json
 echo '{ "position": [1.2, 0.6, 1.6], "target": [1.6, 0.1, 0.2], "fov_degrees": 34 }' >textured/close.json
 for in in small textured; do
@@ -34,11 +36,14 @@ for view in whole close; do
     "$vcp" render textured/lossless.vcp --device host --camera textured/$view.json --size 320x200 --samples 1 --shading unlit \
         --depth textured/$view.pfm -o textured/$view.png --overwrite --progress none
 done
+"$vcp" render textured/channels.vcp --device host --camera textured/close.json --size 320x200 --samples 1 \
+    --depth textured/channels.pfm -o textured/channels.png --overwrite --progress none
 "$make_scan" --triangles 300000 --colour -o large.ply
 "$vcp" build large.ply -o large.vcp --overwrite --progress none
 rm -rf shards
 "$vcp" shard large.vcp -o shards --size 64K --progress none
-"$hostile_files" hostile.bin 2000 "$here"/../../fuzz/seeds/fuzz_file/* small.vcp small/lossless.vcp small/jpeg.vcp
+"$hostile_files" hostile.bin 2000 "$here"/../../fuzz/seeds/fuzz_file/* small.vcp small/lossless.vcp small/jpeg.vcp \
+    textured/channels.vcp
 "$node" "$here/module_test.mjs" "$folder" scan.vcp hostile.bin whole close
 "$node" "$here/image_test.mjs" "$folder" textured
 # The folder is a package for npm that needs no other one.

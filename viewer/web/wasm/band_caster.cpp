@@ -31,6 +31,7 @@ HostLayer layerOf(const CutScene& cut, const FrameRequest& part, const Dataset& 
             .rays = pictureRays(part),
             .frame = frameConstants(part, &dataset, 1, withColour, errorPixels),
             .hasColour = withColour,
+            .hasChannels = part.shading.channels,
             .caps = capsOf(part, dataset),
             .marks = marks};
 }

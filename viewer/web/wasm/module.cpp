@@ -370,10 +370,10 @@ EXPORT(vcp_records) const CutRecord* vcp_records() { return opened.records.data(
 EXPORT(vcp_tiles) const TileRecord* vcp_tiles() { return opened.tiles.data(); }
 EXPORT(vcp_tiles_count) int vcp_tiles_count() { return int(opened.tiles.size()); }
 
-/// Returns the tables of images and materials for vcp_follow_images(). Precondition: images are shown.
+/// Returns the tables of images, materials and their channels for vcp_follow_images(). Precondition: images are shown.
 EXPORT(vcp_tables) const std::byte* vcp_tables() {
-    const auto images = opened.datasets[0].source->images();
-    opened.tables = ImageTables{(*images)->tables().images, (*images)->tables().materials, {}}.stored();
+    const ImageTables& tables = (*opened.datasets[0].source->images())->tables();
+    opened.tables = ImageTables{tables.images, tables.materials, tables.channels, {}}.stored();
     return opened.tables.data();
 }
 EXPORT(vcp_tables_bytes) int vcp_tables_bytes() { return int(opened.tables.size()); }
@@ -419,7 +419,11 @@ EXPORT(vcp_follow_images) void vcp_follow_images(const std::byte* tables) {
     const ImagesPlace& place = opened.dataset->header.images;
     const auto* const images = reinterpret_cast<const ImageRow*>(tables);
     const auto* const materials = reinterpret_cast<const MaterialRow*>(images + place.images);
-    opened.imageCopies = ImageCopies({{images, images + place.images}, {materials, materials + place.materials}, {}});
+    const auto* const channels = reinterpret_cast<const ChannelRow*>(materials + place.materials);
+    opened.imageCopies = ImageCopies({{images, images + place.images},
+                                      {materials, materials + place.materials},
+                                      {channels, channels + place.channels},
+                                      {}});
 }
 EXPORT(vcp_tile_room) std::byte* vcp_tile_room(double number) { return opened.imageCopies.room(uint32_t(number)); }
 EXPORT(vcp_tile_drop) void vcp_tile_drop(double number) { opened.imageCopies.drop(uint32_t(number)); }
