@@ -20,7 +20,7 @@ Query: fault=NAME, with
   reset      breaks the connection within the header         escape     Content-Range with an escape sequence and 60000 letters
   auth       status 401 unless user "user" and password "se/cret" come along
   inside     to fault=auth of the same server                away       to fault=auth of another name of it
-What would never end does after 30 s. log=1: writes the file "asked" into the folder, at each request.
+What would never end does after 30 s. log=1: writes the file "asked" into the folder, at each request; log=all: a line each.
 after=K: the fault begins with the request after K good ones. Files are read anew for each request; the
 entity tag is made from time of change and size.
 """
@@ -106,8 +106,9 @@ class Handler(http.server.BaseHTTPRequestHandler):
         query = urllib.parse.parse_qs(address.query)
         fault = query.get("fault", [""])[0]
         if "log" in query:
-            with open(os.path.join(Handler.folder, "asked"), "w") as file:
-                file.write(self.path)
+            keeps = query["log"] == ["all"]
+            with open(os.path.join(Handler.folder, "asked"), "a" if keeps else "w") as file:
+                file.write(self.path + ("\n" if keeps else ""))
         seen = Handler.good.get(self.path, 0)
         Handler.good[self.path] = seen + 1
         if seen < int(query.get("after", ["0"])[0]) and fault not in ("weak", "untagged", "nomulti"):

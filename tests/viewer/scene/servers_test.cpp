@@ -88,7 +88,7 @@ TEST_F(Servers, ShardsAreReadFromBesideTheirManifest) {
         const std::string text = contentOf(folder_ / "shards/asked");
         return std::count(text.begin(), text.end(), '\n');
     };
-    const auto reader = openReader(server.url("manifest.vcps?log=1"), {});
+    const auto reader = openReader(server.url("manifest.vcps?log=all"), {});
     ASSERT_TRUE(reader.ok()) << reader.error().line();
     const auto dataset = readDatasetStart(**reader);
     ASSERT_TRUE(dataset.ok()) << dataset.error().line();
