@@ -10,7 +10,6 @@ namespace vcp {
 
 namespace {
 
-uint64_t alignPage(uint64_t bytes) { return (bytes + kPageAlignment - 1) & ~(kPageAlignment - 1); }
 uint64_t directoryBytes(uint64_t pages) { return blocksOf(pages) * kBlockBytes; }
 
 StoredPage storedPage(PackedPage packed, std::span<const std::byte> colour) {

@@ -12,6 +12,9 @@
 
 namespace vcp {
 
+/// Returns where a page begins that follows so many bytes.
+constexpr uint64_t alignPage(uint64_t bytes) { return (bytes + kPageAlignment - 1) & ~(kPageAlignment - 1); }
+
 /// A page as it is stored in the file.
 struct StoredPage {
     std::vector<std::byte> geometry;

@@ -1,6 +1,7 @@
 #include "streaming/shard/shard_folder.h"
 
 #include <algorithm>
+#include <array>
 #include <numeric>
 #include <string>
 #include <vector>
@@ -12,7 +13,6 @@
 #include "octree/io/content_hash.h"
 #include "octree/io/durable_file.h"
 #include "octree/io/output_folder.h"
-#include "octree/surface/morton.h"
 #include "octree/vcp_verify.h"
 #include "octree/vcp_writer.h"
 #include "streaming/shard/shard_images.h"
@@ -31,6 +31,23 @@ FolderRules rulesOf(const ShardOptions& options) {
             .overwrite = true,
             .howToReplace = {},
             .inputs = options.inputs};
+}
+
+/// The name of a shard, as ShardRow has it.
+using ContentName = std::array<uint64_t, 2>;
+
+/// Returns the name that a file's bytes have. `progress` is called with how many are read; false cancels.
+Result<ContentName> contentNameOf(const ByteReader& file, const std::function<bool(uint64_t)>& progress) {
+    XXH3_state_t hash;
+    XXH3_128bits_reset(&hash);
+    uint64_t done = 0;
+    VCP_TRY(readInPieces(file, 0, file.size(), [&](std::span<const std::byte> piece) -> Result<void> {
+        XXH3_128bits_update(&hash, piece.data(), piece.size());
+        done += piece.size();
+        return progress(done) ? Result<void>() : Error::cancelled();
+    }));
+    const XXH128_hash_t digest = XXH3_128bits_digest(&hash);
+    return ContentName{digest.low64, digest.high64};
 }
 
 /// Writes the shards of a file, one after the other, and then their manifest.
@@ -176,15 +193,9 @@ private:
             header_.tiles = tables.tiles.size();
             header_.tileTable = tables.bytes() - tables.tiles.size() * sizeof(TileRow);
         }
-        XXH3_state_t hash;
-        XXH3_128bits_reset(&hash);
-        VCP_TRY(readInPieces(*file, 0, bytes, [&](std::span<const std::byte> piece) -> Result<void> {
-            XXH3_128bits_update(&hash, piece.data(), piece.size());
-            return advance(0);
-        }));
-        const XXH128_hash_t digest = XXH3_128bits_digest(&hash);
+        VCP_TRY_ASSIGN(const auto name, contentNameOf(*file, [&](uint64_t) { return goesOn(); }));
         const PageEntry& first = whole_.pages[split_.firstPages[shard]];
-        shards_.push_back({.name = {digest.low64, digest.high64},
+        shards_.push_back({.name = {name[0], name[1]},
                            .bytes = bytes,
                            .pages = dataset.pages.size(),
                            .morton = first.morton,
@@ -253,8 +264,10 @@ private:
 
     Result<void> advance(uint64_t bytes) {
         done_ += bytes;
-        const double share = std::min(1.0, double(done_) / double(file_.size()));
-        return !options_.progress || options_.progress(share) ? Result<void>() : Error::cancelled();
+        return goesOn() ? Result<void>() : Error::cancelled();
+    }
+    [[nodiscard]] bool goesOn() const {
+        return !options_.progress || options_.progress(std::min(1.0, double(done_) / double(file_.size())));
     }
 
     const ByteReader& file_;
@@ -343,17 +356,10 @@ Result<void> verifyShards(const ShardedReader& reader, const std::function<bool(
     for (uint64_t number = 0; number < shards; ++number) {
         VCP_TRY_ASSIGN(const auto row, reader.manifest().shard(number));
         VCP_TRY_ASSIGN(const auto file, reader.shardFile(number));
-        XXH3_state_t hash;
-        XXH3_128bits_reset(&hash);
-        uint64_t done = 0;
-        VCP_TRY(readInPieces(*file, 0, row.bytes, [&](std::span<const std::byte> piece) -> Result<void> {
-            XXH3_128bits_update(&hash, piece.data(), piece.size());
-            done += piece.size();
-            return progress((double(number) + double(done) / double(row.bytes)) / double(shards)) ? Result<void>()
-                                                                                                  : Error::cancelled();
-        }));
-        const XXH128_hash_t digest = XXH3_128bits_digest(&hash);
-        if (digest.low64 != row.name[0] || digest.high64 != row.name[1])
+        VCP_TRY_ASSIGN(const auto name, contentNameOf(*file, [&](uint64_t done) {
+                           return progress((double(number) + double(done) / double(row.bytes)) / double(shards));
+                       }));
+        if (name != ContentName{row.name[0], row.name[1]})
             return Error{.code = ErrorCode::InvalidInput,
                          .message = "its bytes are not those that its name stands for: it was changed or damaged",
                          .file = file->name()};

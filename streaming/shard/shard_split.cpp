@@ -2,13 +2,18 @@
 
 #include <algorithm>
 
+#include "octree/vcp_writer.h"
+
 namespace vcp {
 
 namespace {
 
 constexpr uint64_t kSmallestShare = 16;
 
-uint64_t aligned(uint64_t bytes) { return (bytes + kPageAlignment - 1) / kPageAlignment * kPageAlignment; }
+/// Returns what a page takes in a file, with its entry.
+uint64_t bytesOf(const PageEntry& page) {
+    return alignPage(page.storedBytes) + alignPage(page.colourStoredBytes) + sizeof(PageEntry);
+}
 
 }  // namespace
 
@@ -24,17 +29,15 @@ ShardSplit splitIntoShards(const Dataset& dataset, uint64_t shardBytes) {
     ShardSplit split;
     for (size_t p = pages.size(); p-- > 0;) {
         const PageEntry& page = pages[p];
-        const uint64_t own = aligned(page.storedBytes) + aligned(page.colourStoredBytes) + sizeof(PageEntry);
-        below[p] = own;
+        below[p] = bytesOf(page);
         for (const uint64_t child : childrenOf(page)) below[p] += below[child];
         if (below[p] <= shardBytes) continue;
-        below[p] = own;
+        below[p] = bytesOf(page);
         for (const uint64_t child : childrenOf(page)) {
             if (pages[child].childMask != 0 && below[child] > shardBytes / kSmallestShare) {
                 split.firstPages.push_back(child);
                 // The child itself stays.
-                below[child] =
-                    aligned(pages[child].storedBytes) + aligned(pages[child].colourStoredBytes) + sizeof(PageEntry);
+                below[child] = bytesOf(pages[child]);
             }
             below[p] += below[child];
         }

@@ -34,16 +34,7 @@ protected:
             folder_.path(), [](uint32_t x, uint32_t y) { return x * 2 | y * 5 << 8 | (x + y) << 16; },
             [](uint32_t x, uint32_t y) { return (x / 4 + y / 4) % 2 == 0 ? 0xffffffu : 0x4060u; }, backwards);
     }
-    [[nodiscard]] BuildOptions options() const {
-        BuildOptions o;
-        o.inputs = {folder_ / "walls.obj"};
-        o.output = output();
-        o.cell = 0.06;
-        o.threads = 2;
-        o.overwrite = true;
-        o.keepImages = true;
-        return o;
-    }
+    [[nodiscard]] BuildOptions options() const { return test::keepingImages(folder_ / "walls.obj", output(), 0.06); }
     [[nodiscard]] fs::path output() const { return folder_ / "walls.vcp"; }
     [[nodiscard]] std::string built(const BuildOptions& options) const {
         const auto report = buildOctree(options);

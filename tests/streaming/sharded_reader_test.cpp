@@ -12,6 +12,7 @@
 #include <gtest/gtest.h>
 
 #include "octree/io/content_hash.h"
+#include "octree/vcp_writer.h"
 #include "streaming/shard/shard_folder.h"
 #include "streaming/web_address.h"
 #include "tests/support/directory_files.h"
@@ -316,7 +317,7 @@ public:
             next += count(level);
         }
         header.certifiedErrorMax = 1;
-        const uint64_t pagesBegin = aligned(blockOffset(blocksOf(pages_)));
+        const uint64_t pagesBegin = alignPage(blockOffset(blocksOf(pages_)));
         header.fileBytes = pagesBegin + pages_ * kPageAlignment + sizeof(CommitRecord);
         Bytes first(kDirectoryOffset);
         std::memcpy(first.data(), &header, sizeof header);
@@ -421,9 +422,8 @@ public:
 private:
     static uint64_t count(uint32_t level) { return uint64_t{1} << 2 * level; }
     static uint64_t before(uint32_t level) { return (count(level) - 1) / 3; }
-    static uint64_t aligned(uint64_t at) { return (at + kPageAlignment - 1) / kPageAlignment * kPageAlignment; }
     static uint64_t offsetIn(const ShardRow& row, uint64_t page) {
-        return aligned(blockOffset(blocksOf(row.pages))) + page * kPageAlignment;
+        return alignPage(blockOffset(blocksOf(row.pages))) + page * kPageAlignment;
     }
     /// Levels of a shard that begins on one: its first page's, and those up to where the next shards begin.
     [[nodiscard]] uint32_t levelsFrom(uint32_t level) const { return std::min(step_ + 1, levels_ - level); }

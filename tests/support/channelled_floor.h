@@ -9,7 +9,6 @@
 
 #include <fmt/format.h>
 
-#include "builder/build.h"
 #include "tests/support/gltf_files.h"
 #include "tests/support/textured_walls.h"
 
@@ -71,14 +70,7 @@ struct ChannelledFloor {
     }
 
     static BuildOptions options(const std::filesystem::path& folder) {
-        BuildOptions options;
-        options.inputs = {folder / "floor.gltf"};
-        options.output = folder / "floor.vcp";
-        options.cell = 0.2;
-        options.threads = 2;
-        options.overwrite = true;
-        options.keepImages = true;
-        return options;
+        return keepingImages(folder / "floor.gltf", folder / "floor.vcp", 0.2);
     }
 };
 

@@ -11,6 +11,7 @@
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 
+#include "builder/build.h"
 #include "tests/support/png_files.h"
 
 namespace vcp::test {
@@ -26,6 +27,18 @@ inline void writeTexels(const std::filesystem::path& path, uint32_t width, uint3
             for (int channel = 0; channel < 3; ++channel) rows += char(texel(x, y) >> 8 * channel & 255u);
     }
     std::ofstream(path, std::ios::binary) << pngFile(width, height, 8, 2, rows);
+}
+
+/// Returns how a mesh is built whose images are kept.
+inline BuildOptions keepingImages(const std::filesystem::path& mesh, const std::filesystem::path& output, double cell) {
+    BuildOptions options;
+    options.inputs = {mesh};
+    options.output = output;
+    options.cell = cell;
+    options.threads = 2;
+    options.overwrite = true;
+    options.keepImages = true;
+    return options;
 }
 
 /// The floor, z = 0, and the wall, y = 0, both 4 long and 3 wide. The floor shows an image of 96 x 40 texels 2.5 times
