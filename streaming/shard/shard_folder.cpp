@@ -202,14 +202,14 @@ private:
                            .level = first.level});
         report_.bytes += bytes;
         ++report_.shards;
-        return keepOrRename(unnamed, shardName(shards_.back()), bytes);
+        return keepOrRename(unnamed, shards_.back());
     }
 
-    /// Takes the file of a shard that is there already in place of the new one.
-    Result<void> keepOrRename(const fs::path& unnamed, const std::string& name, uint64_t bytes) {
+    /// Takes the file of a shard that is there already, and intact, in place of the new one.
+    Result<void> keepOrRename(const fs::path& unnamed, const ShardRow& shard) {
         std::error_code failed;
-        const fs::path old = folder_.folder() / name, made = folder_.unfinished() / name;
-        if (fs::file_size(old, failed) == bytes && !failed) {
+        const fs::path old = folder_.folder() / shardName(shard), made = folder_.unfinished() / shardName(shard);
+        if (isIntact(old, shard)) {
             fs::create_hard_link(old, made, failed);
             if (!failed) {
                 ++report_.shardsKept;
@@ -219,6 +219,16 @@ private:
         }
         fs::rename(unnamed, made, failed);
         return failed ? Result<void>(systemError(made, "cannot be written", failed.value())) : Result<void>();
+    }
+
+    /// Whether a file is there and has the bytes that its name says.
+    [[nodiscard]] bool isIntact(const fs::path& path, const ShardRow& shard) const {
+        std::error_code failed;
+        if (fs::file_size(path, failed) != shard.bytes || failed) return false;
+        const auto file = openFile(path);
+        if (!file) return false;
+        const auto name = contentNameOf(**file, [&](uint64_t) { return goesOn(); });
+        return name && *name == ContentName{shard.name[0], shard.name[1]};
     }
 
     /// Returns the runs, and checks that the file is laid out as shards are.

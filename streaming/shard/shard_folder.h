@@ -26,14 +26,15 @@ struct ShardReport {
 };
 
 /// Cuts a .vcp file into shards. A folder of shards that is there is replaced; of these, the files that stay the same
-/// are kept as they are, so that what copies folders by name has less to do. Memory: the file's directory and a page.
-/// Errors: InvalidInput (the file is damaged), Usage (the folder holds something else), Io, Cancelled.
+/// are kept as they are, so that what copies folders by name has less to do. Memory: the file's directory twice, a
+/// page, the coarse levels of images and the manifest. Errors: InvalidInput (the file is damaged), Usage (the folder
+/// holds something else), Io, Cancelled.
 Result<ShardReport> writeShards(const ByteReader& file, const ShardOptions& options);
 
 /// Checks, as writeShards would, what is at the folder's name, and leaves nothing behind. Errors: Usage, Io.
 Result<void> checkShardFolder(const ShardOptions& options);
 
-/// Writes the one file, whatever `reader` reads it from, and checks it. Errors: InvalidInput, Io, Cancelled.
+/// Checks all that `reader` reads, whatever from, and writes it as one file. Errors: InvalidInput, Io, Cancelled.
 Result<void> packShards(const ByteReader& reader, const std::filesystem::path& output, const OutputRules& rules,
                         const std::function<bool(double)>& progress);
 

@@ -19,7 +19,6 @@ constexpr uint64_t kHashBytes = sizeof(uint64_t);
 constexpr uint64_t kBlockStride = kManifestBlockRows * kManifestRowBytes + kHashBytes;
 // Blocks of a table that stay in memory: some 4 MiB.
 constexpr size_t kMostBlocks = 256;
-constexpr uint64_t kMostRows = uint64_t{1} << 40;
 
 /// Returns the hash of what a manifest begins with, whose own hash is left out.
 uint64_t hashOfStart(std::span<const std::byte> start) {
@@ -88,7 +87,7 @@ std::vector<std::byte> storedManifest(ManifestHeader header, std::span<const std
 
 std::vector<uint64_t> blocksToKeep(const std::vector<PageRun>& runs, uint64_t pages) {
     std::vector<uint64_t> kept;
-    for (uint64_t block = 0; block < std::min(kLeadBlocks, blocksOf(pages)); ++block) kept.push_back(block);
+    for (uint64_t block = 0; block < leadBlocks(blocksOf(pages)); ++block) kept.push_back(block);
     // Where the entries of another shard begin, of each block; the first ones are not counted.
     uint64_t block = 0;
     uint32_t changes = 0;
@@ -133,7 +132,8 @@ Result<void> ShardManifest::readStart() {
     const uint64_t directoryEnd = blockOffset(blocksOf(fileHeader_.pages)), end = pagesEnd();
     if (directoryEnd > end || fileHeader_.fileBytes < sizeof(CommitRecord))
         return fail(kDirectoryOffset, "the directory does not fit the file");
-    if (header_.shards < 1 || header_.shards > kMostRows || header_.runs < 1 || header_.runs > kMostRows ||
+    // Each shard has a run at least, and each run a page.
+    if (header_.shards < 1 || header_.shards > header_.runs || header_.runs > fileHeader_.pages ||
         header_.keptBlocks > blocksOf(fileHeader_.pages))
         return fail(offsetof(ManifestHeader, shards), "counts out of range");
     const bool hasImages = (fileHeader_.flags & kFlagImages) != 0;
@@ -228,7 +228,7 @@ Result<ShardManifest::Block<Row>> ShardManifest::block(const Table<Row>& table, 
     std::memcpy(made->data(), body.data(), body.size());
     VCP_TRY(check(number, *made));
     const std::lock_guard lock(mutex_);
-    if (table.blocks.size() >= kMostBlocks) table.blocks.erase(table.blocks.begin());
+    if (table.blocks.size() >= kMostBlocks) table.blocks.clear();
     table.blocks[number] = made;
     return Block<Row>(made);
 }

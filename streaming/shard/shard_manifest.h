@@ -13,9 +13,9 @@
 //   ...     blocks of 48-byte rows, each behind the one before it, with a hash: the shards, then the runs
 //
 // A run is of pages that follow each other in the one file and in a shard. Runs are in the order of the one file. Kept
-// are the directory's first blocks, and those that would have to be put together from several shards. So what a first
-// picture needs is in front, however many shards there are, and readers fetch the rest as they need it. All numbers
-// little endian.
+// are the blocks of the directory that are read when a file is opened, and those that would have to be put together
+// from several shards. So what a first picture needs is in front, however many shards there are, and readers fetch the
+// rest as they need it. All numbers little endian.
 #pragma once
 
 #include <cstddef>
@@ -37,8 +37,10 @@ inline constexpr const char* kManifestName = "manifest.vcps";
 inline constexpr uint64_t kManifestRowBytes = 48;
 inline constexpr uint64_t kManifestBlockRows = 341;
 inline constexpr uint64_t kManifestTables = 8192;  ///< where the tables begin
-/// Blocks of the directory that are read at once when a file is opened.
-inline constexpr uint64_t kLeadBlocks = kLeadBytes / kBlockBytes - 1;
+/// Returns how many blocks of the directory are read when a file is opened, of so many.
+constexpr uint64_t leadBlocks(uint64_t blocks) {
+    return blocks * kBlockBytes <= wholeDirectoryBytes(kLeadBytes) ? blocks : kLeadBytes / kBlockBytes - 1;
+}
 /// Other blocks are kept where they have entries of more shards.
 inline constexpr uint32_t kMostShardsOfBlock = 6;
 

@@ -154,6 +154,17 @@ TEST_F(Shards, AreKeptWhereTheyStayTheSame) {
     EXPECT_TRUE(allOf(*opened()) == file);
 }
 
+TEST_F(Shards, ADamagedShardIsWrittenAnew) {
+    const Bytes file = fileOf(5, 5, 0.45);
+    const uint64_t shards = split(file, file.size() / 8).shards;
+    const fs::path damaged = shardFiles().at(2);
+    std::string content = contentOf(damaged);
+    content[content.size() / 2] = char(content[content.size() / 2] ^ 1);
+    std::ofstream(damaged, std::ios::binary) << content;
+    EXPECT_EQ(split(file, file.size() / 8).shardsKept, shards - 1);
+    EXPECT_TRUE(allOf(*opened()) == file);
+}
+
 TEST_F(Shards, AFolderWithSomethingElseIsNotReplaced) {
     const Bytes file = fileOf(3, 3, 0.4);
     split(file, file.size());
@@ -177,7 +188,7 @@ TEST_F(Shards, CancellingLeavesNothing) {
 
 TEST_F(Shards, DamageIsNamed) {
     // So large that its manifest does not keep all of the directory.
-    const Bytes file = fileOf(5, 6, 0.45);
+    const Bytes file = fileOf(5, 7, 0.5);
     split(file, file.size() / 10);
     const auto files = shardFiles();
     const auto shard = *std::max_element(files.begin(), files.end(), [](const fs::path& a, const fs::path& b) {
@@ -326,8 +337,7 @@ public:
         ManifestHeader manifest;
         manifest.commit.fileBytes = header.fileBytes;
         manifest.commit.headerHash = header.hash;
-        manifest.commit.hash =
-            hashBytes(std::as_bytes(std::span(&manifest.commit, 1)).first(offsetof(CommitRecord, hash)));
+        seal(manifest.commit);
 
         // The shard of a page is that of its ancestor on the last level before its own on which shards begin.
         std::vector<ShardRow> shards;
@@ -365,6 +375,13 @@ public:
         for (const uint64_t block : blocksToKeep(runs, pages_)) {
             kept.push_back({block, Bytes(kBlockBytes)});
             EXPECT_TRUE(plain->read(blockOffset(block), kept.back().bytes).ok());
+        }
+        if (kept.size() == blocksOf(pages_)) {
+            Bytes directory;
+            for (const KeptBlock& block : kept)
+                directory.insert(directory.end(), block.bytes.begin(), block.bytes.end());
+            manifest.commit.directoryHash = hashBytes(directory);
+            seal(manifest.commit);
         }
         return storedManifest(manifest, first, shards, runs, kept);
     }
@@ -420,6 +437,9 @@ public:
     mutable uint64_t reads = 0;
 
 private:
+    static void seal(CommitRecord& commit) {
+        commit.hash = hashBytes(std::as_bytes(std::span(&commit, 1)).first(offsetof(CommitRecord, hash)));
+    }
     static uint64_t count(uint32_t level) { return uint64_t{1} << 2 * level; }
     static uint64_t before(uint32_t level) { return (count(level) - 1) / 3; }
     static uint64_t offsetIn(const ShardRow& row, uint64_t page) {
@@ -481,6 +501,8 @@ FirstPicture firstPictureOf(uint32_t levels) {
 
 TEST(EndlessShards, AFirstPictureTakesTheSameHoweverManyThereAre) {
     const FirstPicture few = firstPictureOf(9), many = firstPictureOf(13);
+    // Directories that are read whole: of 341 and of 1365 pages.
+    for (const uint32_t levels : {5u, 6u}) EXPECT_LE(firstPictureOf(levels).shardReads, few.shardReads);
     EXPECT_GT(few.pages, 80'000u);
     EXPECT_GT(many.pages, 20'000'000u);
     EXPECT_GT(many.shards, 60'000u);

@@ -139,8 +139,8 @@ Result<ShardReport> cutIntoShards(const BuildCommand& command, const BuildOption
     }();
     if (!report) {
         Error error = report.error();
-        error.message += fmt::format("; the mesh is built: `vcp shard {} -o {}` goes on from there",
-                                     options.output.string(), command.output);
+        error.message += fmt::format("; the mesh is built: `vcp shard {} -o {} --size {}` goes on from there",
+                                     options.output.string(), command.output, command.shardBytes);
         return error;
     }
     std::error_code failed;
@@ -160,11 +160,11 @@ Result<int> run(const BuildCommand& command) {
     if (!folder.empty() && !command.dryRun) {
         VCP_TRY(checkShardFolder({.folder = folder, .inputs = options.inputs}));
         std::error_code ignored;
-        if (!command.overwrite && std::filesystem::exists(options.output, ignored))
+        if (std::filesystem::exists(options.output, ignored))
             return Error{.code = ErrorCode::Usage,
                          .message =
                              "is there, where the file that is cut would be built: cut it with `vcp shard` if an "
-                             "interrupted build left it, move it away, or let --overwrite replace it",
+                             "interrupted build left it, or move it away",
                          .file = options.output.string()};
     }
     options.resume = command.resume;

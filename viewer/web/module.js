@@ -106,8 +106,8 @@ export class Module {
     /// Where a stretch lies: the name of its file, beside the one that was begun with and empty for that one, and the
     /// offset in it.
     placeOf(offset) {
-        const span = this.wasm.vcp_file_span(), number = Math.floor(offset / span);
-        return { name: this.textAt(this.wasm.vcp_file_name(number)), offset: offset - number * span };
+        const number = this.wasm.vcp_file_at(offset);
+        return { name: this.textAt(this.wasm.vcp_file_name(number)), offset: offset - this.wasm.vcp_file_begin(number) };
     }
     numbers(at, count) {
         return [...new Float64Array(this.wasm.memory.buffer, at, count)];

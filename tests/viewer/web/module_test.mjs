@@ -164,6 +164,7 @@ await check('a scan in shards is drawn as the file is, from the shards that it n
     const whole = new Ranges('scan.vcp', server(fs.readFileSync('large.vcp'))), shards = new Files('folder/manifest.vcps?key=a', inFolder);
     const alone = await opened(whole), module = await opened(shards);
     assert.deepEqual(module.info(), alone.info());
+    assert.deepEqual(alone.placeOf(2 ** 40), { name: '', offset: 2 ** 40 }, 'one file may have any size');
     const orbit = new Orbit(), info = module.info();
     orbit.fit(info.boundsMin, info.boundsMax, 1.6);
     look(module, orbit);

@@ -65,7 +65,9 @@ cmp scan.vcp empty/scan.vcp
 diff -r shards built
 [ ! -e built.whole.vcp ] || fail "the file that was cut is left"
 echo precious >built.whole.vcp
-expect 2 "is there" "$vcp" build scan.ply -o built --shards 64K --progress none
+for more in "" --overwrite --resume; do
+    expect 2 "is there" "$vcp" build scan.ply -o built --shards 64K --progress none $more
+done
 grep -q precious built.whole.vcp || fail "a file that is not ours was replaced"
 "$vcp" publish shards -o parted --viewer viewer >/dev/null
 cmp shards/manifest.vcps parted/scan.vcp

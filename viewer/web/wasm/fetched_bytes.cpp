@@ -64,6 +64,7 @@ Result<std::shared_ptr<FetchedDataset>> FetchedDataset::open(const std::shared_p
         opened->dataset_ = std::move(file);
         return opened;
     }
+    opened->isSharded_ = true;
     const auto openShard = [bytes, files = opened->files_](const ShardRow& shard,
                                                            bool) -> Result<std::shared_ptr<const ByteReader>> {
         // A shard that was let go keeps its number.

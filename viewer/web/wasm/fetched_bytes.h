@@ -17,7 +17,7 @@ struct Stretch {
     uint64_t offset = 0, bytes = 0;
 };
 
-/// Files have their bytes in one row of numbers: those of file k begin at k * kFileSpan.
+/// Files have their bytes in one row of numbers: where there are shards, those of file k begin at k * kFileSpan.
 inline constexpr uint64_t kFileSpan = uint64_t{1} << 36;
 
 /// Keeps what was fetched, and notes what is missing.
@@ -70,6 +70,8 @@ public:
 
     /// Reads that end behind `end` fail as Limit, from now on.
     void refuseBehind(uint64_t end) { refusedBehind_ = end; }
+    /// Returns the number of the file that has the byte at an offset of what is fetched.
+    [[nodiscard]] uint64_t fileAt(uint64_t offset) const { return isSharded_ ? offset / kFileSpan : 0; }
     /// Returns the name of the file that has a number: beside file 0, whose own is empty.
     [[nodiscard]] const std::string& fileNamed(uint64_t number) const { return (*files_)[number]; }
 
@@ -82,6 +84,7 @@ private:
     FetchedDataset() = default;
     std::shared_ptr<const ByteReader> dataset_;
     std::shared_ptr<std::vector<std::string>> files_ = std::make_shared<std::vector<std::string>>(1);  // by number
+    bool isSharded_ = false;
     uint64_t refusedBehind_ = UINT64_MAX;
 };
 

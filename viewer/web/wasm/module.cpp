@@ -208,12 +208,16 @@ EXPORT(vcp_open) int vcp_open() {
     return done.error().code == ErrorCode::Cancelled ? kMissing : fail(done.error());
 }
 
-/// Returns the name of a file that is fetched, which lies beside file 0; empty for file 0 itself.
+/// Returns the number of the file that has the byte at an offset of what is fetched; 0: that which was begun with.
+EXPORT(vcp_file_at) int vcp_file_at(double offset) {
+    return opened.bytes ? int(opened.bytes->fileAt(uint64_t(offset))) : 0;
+}
+/// Returns the name of a file, which lies beside file 0; empty for file 0 itself.
 EXPORT(vcp_file_name) const char* vcp_file_name(int number) {
     return opened.bytes ? opened.bytes->fileNamed(uint64_t(number)).c_str() : "";
 }
-/// Returns how far the first bytes of two files whose numbers follow each other are apart.
-EXPORT(vcp_file_span) double vcp_file_span() { return double(kFileSpan); }
+/// Returns where the bytes of a file begin in what is fetched.
+EXPORT(vcp_file_begin) double vcp_file_begin(int number) { return double(uint64_t(number) * kFileSpan); }
 
 /// Returns how many stretches of the file were missing since the last call.
 EXPORT(vcp_missing) int vcp_missing() {
