@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <queue>
 #include <vector>
 
 #include <glm/common.hpp>
@@ -26,6 +27,19 @@ struct Bounds {
     glm::i32vec3 low, high;
 };
 
+/// A box with many triangles that is still to be split, or to be a leaf.
+struct CrowdedBox {
+    uint32_t index = 0;  // its node
+    NodeBox box;
+    size_t depth = 0;
+    std::vector<uint32_t> list;
+
+    /// Whether the other is split first.
+    bool operator<(const CrowdedBox& other) const {
+        return list.size() != other.list.size() ? list.size() < other.list.size() : index > other.index;
+    }
+};
+
 class ExactTreeBuilder {
 public:
     ExactTreeBuilder(const LatticeMesh& mesh, std::span<const uint32_t> triangles, glm::i32vec3 origin, int cells,
@@ -43,10 +57,12 @@ public:
         const std::vector<uint32_t> inside = trianglesIn(whole);
         for (const uint32_t k : inside) tree_.stray = std::max(tree_.stray, double(mesh_.stray[tree_.triangles[k]]));
         // Long leaves have a record more than triangles.
-        const double room = double(mostRecords_) * kHardCountLong / (kHardCountLong + 1);
-        mostRepetition_ = std::min(kMostRepetition, room / double(std::max<size_t>(inside.size(), 1)));
+        constexpr double kNamed = double(kHardCountLong) / (kHardCountLong + 1);
+        const auto count = double(std::max<size_t>(inside.size(), 1));
+        mostRepetition_ = std::min(kMostRepetition, double(mostRecords_) * kNamed / count);
         tree_.nodes.emplace_back();
         build(0, whole, inside, 1, 0);
+        splitCrowded(std::min(kMostRepetition * kNamed, mostRepetition_) * count);
         return std::move(tree_);
     }
 
@@ -99,7 +115,7 @@ private:
         size_t together = 0;
         for (const auto& child : deal(box, list, depth)) together += child.size();
         const double below = repetition * double(together) / double(list.size());
-        if (below > mostRepetition_) return makeLeaf(index, box, list, depth);
+        if (below > mostRepetition_) return leaveCrowded({index, box, depth, list});
         const uint32_t first = tree_.addChildren(index);
         for (uint32_t i = 0; i < 8; ++i) build(first + i, box.child(int(i)), lists_[depth][i], below, depth + 1);
     }
@@ -126,7 +142,38 @@ private:
         return children;
     }
 
+    void leaveCrowded(CrowdedBox crowded) {
+        if (crowded.list.size() <= kCrowdedLeafTriangles || crowded.box.edge == 1)
+            return makeLeaf(crowded.index, crowded.box, crowded.list, crowded.depth);
+        named_ += crowded.list.size();
+        crowded_.push(std::move(crowded));
+    }
+
+    /// Splits boxes that were left since their triangles would be named too often if all boxes were split as those
+    /// above: the fullest first, while the page's leaves name no more than `most`. Where only some of a page's
+    /// triangles are long, there is room for these.
+    void splitCrowded(double most) {
+        while (!crowded_.empty()) {
+            const CrowdedBox at = crowded_.top();
+            crowded_.pop();
+            named_ -= at.list.size();
+            size_t together = 0;
+            for (const auto& child : deal(at.box, at.list, at.depth)) together += child.size();
+            if (double(named_ + together) > most) {
+                makeLeaf(at.index, at.box, at.list, at.depth);
+                continue;
+            }
+            const uint32_t first = tree_.addChildren(at.index);
+            for (uint32_t i = 0; i < 8; ++i) {
+                tree_.nodes[first + i].box = at.box.child(int(i));
+                if (!lists_[at.depth][i].empty())
+                    leaveCrowded({first + i, at.box.child(int(i)), at.depth + 1, lists_[at.depth][i]});
+            }
+        }
+    }
+
     void makeLeaf(uint32_t index, const NodeBox& box, const std::vector<uint32_t>& list, size_t depth) {
+        named_ += list.size();
         tree_.makeHard(index, list);
         occupyCells(box, list, depth);
     }
@@ -146,6 +193,8 @@ private:
     const LatticeMesh& mesh_;
     size_t mostRecords_;
     double mostRepetition_ = kMostRepetition;
+    size_t named_ = 0;  ///< triangles that leaves and crowded boxes name
+    std::priority_queue<CrowdedBox> crowded_;
     PageTree tree_;
     std::vector<Bounds> bounds_;           ///< by local number
     std::vector<CubeTest> tests_;          ///< of the triangles below the box that was prepared; else empty

@@ -17,6 +17,9 @@ inline constexpr size_t kWideLeafTriangles = 4;
 /// No leaf is split where a triangle would be named more often than this: so a page's leaves name at most so many times
 /// its triangles, however they lie.
 inline constexpr double kMostRepetition = 12;
+/// Leaves with more triangles than this, which were left so large for that reason, are split all the same, the fullest
+/// first, as long as the whole page keeps to it.
+inline constexpr size_t kCrowdedLeafTriangles = 64;
 
 /// How far around a page it needs triangles, in cells: those that only touch it count, and a step of the lattice is
 /// room for rounding.

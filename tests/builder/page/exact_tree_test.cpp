@@ -123,6 +123,24 @@ TEST(ExactTree, LeavesNameWhatTouchesThem) {
     }
 }
 
+// Needles from wall to wall are named too often on the way down for boxes near a cell; the rest of the page's triangles
+// leave room to split those boxes all the same.
+TEST(ExactTree, NeedlesBesideASurfaceAreSplitWhileThereIsRoom) {
+    IndexedMesh mesh = test::torusMesh({16, 16, 16}, 10, 5, 120, 100);
+    constexpr uint32_t kNeedles = 1500;
+    for (uint32_t i = 0; i < kNeedles; ++i) {
+        const double x = 1 + 2.0 * i / kNeedles;
+        const auto first = uint32_t(mesh.positions.size());
+        for (const glm::dvec3 p : {glm::dvec3(x, 1, 2.3), glm::dvec3(x + 0.001, 1, 2.3), glm::dvec3(x, 31, 2.3)})
+            mesh.positions.push_back(p);
+        mesh.triangles.push_back({first, first + 1, first + 2});
+    }
+    const TreePage page(mesh, {0, 0, 0});
+    PageTree tree = page.tree();
+    EXPECT_LE(expectSound(page, tree), kNeedles / 4);
+    expectStored(page, tree);
+}
+
 TEST(ExactTree, MarksTheCellsThatAreTouched) {
     IndexedMesh mesh = bumpyTorus();
     test::append(mesh, test::boxMesh({3, 3, 3}, {25, 9, 12}, 2));
