@@ -19,11 +19,11 @@ constexpr uint32_t roundedUp(uint32_t rows) {
 
 }  // namespace
 
-PicturePart picturePart(const FrameRequest& request, uint32_t number, uint32_t raysPerPixel) {
+PicturePart picturePart(const FrameRequest& request, uint32_t number, uint32_t raysPerPixel, uint64_t mostRays) {
     const bool averages = hasLight(request.shading) && request.shading.occlusionRays > 0;
     const uint32_t around = averages ? kAround : 0, least = averages ? kLeastRowsWithAround : frame::kTileSize;
     const uint64_t raysPerRow = uint64_t{request.width} * raysPerPixel;
-    const uint32_t most = std::max(least, uint32_t(std::min<uint64_t>(kPartRays / raysPerRow, request.height)));
+    const uint32_t most = std::max(least, uint32_t(std::min<uint64_t>(mostRays / raysPerRow, request.height)));
     if (most >= request.height) return {.request = request, .rows = request.height};
     const uint32_t parts = (request.height + most - 1) / most;
     const uint32_t rows = roundedUp((request.height + parts - 1) / parts);

@@ -10,6 +10,8 @@ namespace vcp {
 
 /// What a software device casts in about a tenth of a second.
 constexpr uint64_t kPartRays = 1 << 18;
+/// What a slow graphics card does.
+constexpr uint64_t kCardPartRays = 1 << 22;
 
 struct PicturePart {
     FrameRequest request;        ///< what is drawn: the part, with rows around it that occlusion is averaged over
@@ -19,7 +21,9 @@ struct PicturePart {
 };
 
 /// Returns part `number` of a picture. All parts of a picture are drawn in one size: the last one may reach beyond it.
-/// `raysPerPixel`: what a pixel costs, at least 1; the more, the smaller are the parts. Precondition: the part exists.
-PicturePart picturePart(const FrameRequest& request, uint32_t number, uint32_t raysPerPixel);
+/// `raysPerPixel`: what a pixel costs, at least 1; the more, the smaller are the parts. `mostRays`: of a part, where
+/// its least size allows. Precondition: the part exists.
+PicturePart picturePart(const FrameRequest& request, uint32_t number, uint32_t raysPerPixel,
+                        uint64_t mostRays = kPartRays);
 
 }  // namespace vcp

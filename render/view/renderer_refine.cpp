@@ -56,7 +56,8 @@ Result<uint32_t> Renderer::View::drawPart() {
     VCP_TRY(sums.resize(*shared->device, {shown.request.width, shown.request.height}));
     FrameRequest request = shown.request;
     request.sample = samples;
-    frame.part = picturePart(request, nextPart, raysPerPixel(request, shared->meso != nullptr));
+    frame.part = picturePart(request, nextPart, raysPerPixel(request, shared->meso != nullptr),
+                             shared->info.software ? kPartRays : kCardPartRays);
     VCP_TRY(submit(kRefiningFrame, frame.part->request, {}, false));
     shown.lastUse = std::max(shown.lastUse, frame.submission);
     ++nextPart;
