@@ -101,7 +101,7 @@ Result<void> PagePool::write(PoolSlot slot, uint64_t at, std::span<const std::by
         return {};
     }
     if (stagedBytes_ + bytes.size() > stagings_[filling_].buffer.bytes()) VCP_TRY(flush());
-    if (stagedBytes_ == 0) VCP_TRY(reserveStaging(std::max<uint64_t>(bytes.size(), kStagingBytes)));
+    if (stagedBytes_ == 0) VCP_TRY(reserveStaging(std::max<uint64_t>(bytes.size(), std::min(kStagingBytes, bytes_))));
     std::memcpy(stagings_[filling_].buffer.mapped() + stagedBytes_, bytes.data(), bytes.size());
     waiting_.push_back({chunk, {stagedBytes_, to, bytes.size()}, false, overlapsWaiting(chunk, to, bytes.size())});
     stagedBytes_ += bytes.size();

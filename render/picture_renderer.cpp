@@ -54,12 +54,17 @@ Result<UpdateResult> PictureRenderer::settle(const FrameRequest& request, const 
 }
 
 Result<SettledFrame> PictureRenderer::drawSettled(const FrameRequest& request, const std::function<bool()>& cancel) {
-    std::optional<FrameStats> drawn;
-    VCP_TRY_ASSIGN(auto update, settleAll(*this, request, cancel, drawn));
-    if (!drawn) {
-        VCP_TRY_ASSIGN(drawn, render(request, cancel));
+    // A device that is lost, or short of memory, while it draws leaves out pages that are to be read again.
+    constexpr int kMostTurns = 8;
+    for (int turn = 1;; ++turn) {
+        std::optional<FrameStats> drawn;
+        VCP_TRY_ASSIGN(auto update, settleAll(*this, request, cancel, drawn));
+        if (!drawn) {
+            VCP_TRY_ASSIGN(drawn, render(request, cancel));
+        }
+        if (turn == kMostTurns || drawn->pagesInCut == update.pagesInCut)
+            return SettledFrame{std::move(update), *drawn};
     }
-    return SettledFrame{std::move(update), *drawn};
 }
 
 Result<void> PictureRenderer::refineTo(uint32_t samples, const FrameRequest& request,

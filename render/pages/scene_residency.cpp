@@ -102,8 +102,14 @@ Result<void> SceneResidency::setBudgets(const PageMemorySource& memory, uint64_t
     for (const Request request : std::exchange(tooLarge_, {}))
         if (request.kind != Request::Kind::ImagePiece) policy_->restore(request);
     if (pool_ && shape.units * kPoolUnitBytes == pool_->bytes()) return {};
-    VCP_TRY_ASSIGN(auto carried, pool_ ? carryOut() : std::vector<CarriedPage>());
+    // What can't be carried, for want of memory, is read again.
+    auto carried = pool_ ? carryOut() : std::vector<CarriedPage>();
     VCP_TRY(rebuild(memory));
+    if (carried && !carryIn(*std::move(carried))) forgetPages();
+    return {};
+}
+
+Result<void> SceneResidency::carryIn(std::vector<CarriedPage> carried) {
     for (CarriedPage& page : carried) {
         VCP_TRY_ASSIGN(const auto slot, slotFor(page.page));
         if (slot) VCP_TRY(pool_->write(*slot, 0, page.bytes));
@@ -133,6 +139,10 @@ Result<void> SceneResidency::showImages(size_t dataset, std::shared_ptr<const Im
 
 void SceneResidency::releasePool() {
     pool_.reset();
+    forgetPages();
+}
+
+void SceneResidency::forgetPages() {
     policy_->clear();
     for (Residency& each : datasets_) each.forgetCuts();
     listens_.assign(datasets_.size(), false);
@@ -154,14 +164,10 @@ Result<SceneResidency::Update> SceneResidency::update(std::span<const std::optio
     for (const Loaded& each : loaded)
         if (!each.bytes) giveUp(each);
     policy_->look(views, steadySeconds(), number);
-    for (const Loaded& each : loaded) {
-        if (!each.bytes) continue;
-        if (each.request.isPage()) VCP_TRY(place(each.request.number, *each.bytes));
-        if (each.request.kind == Request::Kind::ImagePiece)
-            datasets_[numbers().datasetOf(each.request)].images_->take(numbers().inDataset(each.request).number,
-                                                                       each.bytes->texels);
+    if (const auto taken = takeIn(loaded); !taken) {
+        forgetPages();  // a slot may hold anything
+        return taken.error();
     }
-    VCP_TRY(pool_->flush());
     PolicyOutcome outcome = policy_->finish(number);
     for (const Wish& wish : imageWishes(views, outcome.cuts, number)) outcome.wishes.push_back(wish);
     loader_->request(std::move(outcome.wishes), uploadBytes());
@@ -181,6 +187,17 @@ Result<SceneResidency::Update> SceneResidency::update(std::span<const std::optio
     all.pagesResident = uint32_t(policy_->pagesResident());
     all.problems = std::exchange(problems_, {});
     return Update{std::move(all), std::move(outcome.cuts)};
+}
+
+Result<void> SceneResidency::takeIn(std::span<const Loaded> loaded) {
+    for (const Loaded& each : loaded) {
+        if (!each.bytes) continue;
+        if (each.request.isPage()) VCP_TRY(place(each.request.number, *each.bytes));
+        if (each.request.kind == Request::Kind::ImagePiece)
+            datasets_[numbers().datasetOf(each.request)].images_->take(numbers().inDataset(each.request).number,
+                                                                       each.bytes->texels);
+    }
+    return pool_->flush();
 }
 
 void SceneResidency::giveUp(const Loaded& failed) {

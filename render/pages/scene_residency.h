@@ -87,6 +87,11 @@ private:
     Result<void> createPool(const PageMemorySource& memory);
     void startLoader();
     Result<std::vector<CarriedPage>> carryOut();
+    Result<void> carryIn(std::vector<CarriedPage> carried);
+    /// Forgets what the pool holds; it is read again.
+    void forgetPages();
+    /// Puts what was read where it belongs.
+    Result<void> takeIn(std::span<const Loaded> loaded);
     /// Returns a slot for the page, with pages moved out of its way; nothing where there is none.
     Result<std::optional<PoolSlot>> slotFor(uint64_t page);
     Result<void> place(uint64_t page, const PageBytes& bytes);

@@ -25,7 +25,7 @@ void Buffer::destroy() {
     if (device_ == VK_NULL_HANDLE) return;
     vkDestroyBuffer(device_, buffer_, nullptr);
     vkFreeMemory(device_, memory_, nullptr);
-    if (memory_ != VK_NULL_HANDLE) *account_ -= bytes_;
+    if (account_ != nullptr) *account_ -= bytes_;
 }
 
 TexelView& TexelView::operator=(TexelView&& other) noexcept {
@@ -189,16 +189,20 @@ Device::~Device() {
     if (!borrowed_) vkDestroyDevice(device_, nullptr);
 }
 
+bool Device::hasUnifiedMemory() const {
+    return (info_.software || info_.type == "integrated") && !faults_.separateMemory;
+}
+
 Result<uint32_t> Device::memoryType(uint32_t allowed, MemoryUse use) const {
     constexpr VkMemoryPropertyFlags kLocal = VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT;
     constexpr VkMemoryPropertyFlags kMapped =
         VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT;
     constexpr VkMemoryPropertyFlags kCached = VK_MEMORY_PROPERTY_HOST_CACHED_BIT;
     // Local memory is mapped only on unified memory: a discrete device's mapped window is small.
-    const bool unified = (info_.software || info_.type == "integrated") && !faults_.separateMemory;
     std::vector<VkMemoryPropertyFlags> wishes;
     if (use == MemoryUse::Local)
-        wishes = unified ? std::vector{kLocal | kMapped | kCached, kLocal | kMapped, kLocal} : std::vector{kLocal};
+        wishes = hasUnifiedMemory() ? std::vector{kLocal | kMapped | kCached, kLocal | kMapped, kLocal}
+                                    : std::vector{kLocal};
     if (use == MemoryUse::Upload) wishes = {kMapped};
     if (use == MemoryUse::Readback) wishes = {kMapped | kCached, kMapped};
     for (const VkMemoryPropertyFlags wish : wishes)
@@ -211,7 +215,6 @@ Result<Buffer> Device::createBuffer(uint64_t bytes, VkBufferUsageFlags usage, Me
     Buffer made;
     made.device_ = device_;
     made.bytes_ = bytes;
-    made.account_ = &allocated_;
     VCP_TRY(allocate(made, usage, use));
     return made;
 }
@@ -269,7 +272,9 @@ Result<void> Device::allocate(Buffer& made, VkBufferUsageFlags usage, MemoryUse 
     VkMemoryAllocateInfo allocation{VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO};
     allocation.allocationSize = needs.size;
     allocation.memoryTypeIndex = type;
-    const bool fits = made.bytes_ <= faults_.memoryBytes && allocated_ <= faults_.memoryBytes - made.bytes_;
+    const bool isItsOwn = use == MemoryUse::Local || hasUnifiedMemory();
+    const bool fits =
+        !isItsOwn || (made.bytes_ <= faults_.memoryBytes && allocated_ <= faults_.memoryBytes - made.bytes_);
     const VkResult allocated =
         fits ? vkAllocateMemory(device_, &allocation, nullptr, &made.memory_) : VK_ERROR_OUT_OF_DEVICE_MEMORY;
     if (allocated != VK_SUCCESS) {
@@ -277,7 +282,10 @@ Result<void> Device::allocate(Buffer& made, VkBufferUsageFlags usage, MemoryUse 
         outOfMemory_ = true;
         return vulkanError("vkAllocateMemory", allocated);
     }
-    allocated_ += made.bytes_;
+    if (isItsOwn) {
+        made.account_ = &allocated_;
+        allocated_ += made.bytes_;
+    }
     VCP_VK(vkBindBufferMemory, device_, made.buffer_, made.memory_, 0);
     const bool isHidden = use == MemoryUse::Local && faults_.separateMemory;
     if (!isHidden && (memory_.memoryTypes[type].propertyFlags & VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT) != 0) {

@@ -148,6 +148,8 @@ public:
 
 private:
     Device() = default;
+    /// Whether the device's memory is the processor's, too.
+    [[nodiscard]] bool hasUnifiedMemory() const;
     Result<void> allocate(Buffer& buffer, VkBufferUsageFlags usage, MemoryUse use) const;
     void describe(VkPhysicalDevice physical, const DeviceInfo& info);
     [[nodiscard]] std::vector<VkQueueFamilyProperties> queueFamilies() const;

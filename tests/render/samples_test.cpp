@@ -373,10 +373,11 @@ TEST_F(SamplesTest, ALostDeviceBeginsAnew) {
     for (const uint64_t lostAt : {2u, 3u, 4u}) {
         SCOPED_TRACE(lostAt);
         RendererOptions options;
+        options.faults.separateMemory = lostAt % 2 == 0;  // then pages are submitted, too
         options.faults.lostAtSubmission = lostAt;
         start(options);
         show(scene);
-        ASSERT_TRUE(renderer_->settle(request) && renderer_->render(request) && renderer_->refineTo(4, request));
+        ASSERT_TRUE(renderer_->drawSettled(request) && renderer_->refineTo(4, request));
         EXPECT_EQ(renderer_->update(request)->deviceLosses, 1u);
         EXPECT_EQ(renderer_->readPicture().value(), expected);
     }
@@ -386,23 +387,27 @@ TEST_F(SamplesTest, WithoutMemoryForSamplesThePoolIsHalved) {
     const Scene scene = test::sphereScene(4);
     FrameRequest request = requestOf(test::cameras(scene)[0].camera, 400, 300);
     request.errorPixels = 0.001;
-    RendererOptions options;
-    options.faults.memoryBytes = 9 << 20;
-    start(options);
-    show(scene);
-    const uint64_t pool = draw(request).poolBytes;
-    ASSERT_TRUE(renderer_->refineTo(3, request));
-    const Picture picture = renderer_->readPicture().value();
-    const uint64_t smaller = renderer_->render(request)->poolBytes;
-    EXPECT_LT(smaller, pool);
-    EXPECT_GT(smaller, 0u);
-    // A pool of that size from the beginning shows the same.
-    RendererOptions plain;
-    plain.budgetBytes = smaller;
-    start(plain);
-    show(scene);
-    sampled(*renderer_, request, 3);
-    EXPECT_EQ(renderer_->readPicture().value(), picture);
+    for (const bool separate : {false, true}) {
+        SCOPED_TRACE(separate);
+        RendererOptions options;
+        options.faults.memoryBytes = 9 << 20;
+        options.faults.separateMemory = options.faults.separateCopies = separate;
+        start(options);
+        show(scene);
+        const uint64_t pool = draw(request).poolBytes;
+        ASSERT_TRUE(renderer_->refineTo(3, request));
+        const Picture picture = renderer_->readPicture().value();
+        const uint64_t smaller = renderer_->render(request)->poolBytes;
+        EXPECT_LT(smaller, pool);
+        EXPECT_GT(smaller, 0u);
+        // A pool of that size from the beginning shows the same.
+        RendererOptions plain;
+        plain.budgetBytes = smaller;
+        start(plain);
+        show(scene);
+        sampled(*renderer_, request, 3);
+        EXPECT_EQ(renderer_->readPicture().value(), picture);
+    }
 }
 
 TEST_F(SamplesTest, APartInFlightMayLoseAll) {
