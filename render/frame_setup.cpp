@@ -194,7 +194,6 @@ frame::FrameConstants frameConstants(const FrameRequest& request, const Dataset*
     c.lightPlane = hitPlanes(request, colour) - 1;
     c.paperEpsilon = request.march.epsilon;
     c.worldPerCell = float(header.cell * placement.scale);
-    c.isCovering = dataset != nullptr && dataset->isCovering() ? 1 : 0;
     const glm::dquat& q = placement.rotation;
     c.rotation = glm::vec4(glm::dvec4(q.x, q.y, q.z, q.w));
     if (request.shading.environment) {

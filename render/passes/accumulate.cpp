@@ -22,7 +22,7 @@ AccumulatePass::AccumulatePass() : pipelines_(kAccumulateSpirv) {}
 
 Result<void> AccumulatePass::prepare(FrameResources& resources, const PassConstants& constants) {
     PassConstants plain = constants;
-    plain.colour = plain.countSteps = plain.falseColour = false;
+    plain.colour = plain.countSteps = plain.falseColour = plain.seams = false;
     return pipelines_.choose(resources, plain);
 }
 

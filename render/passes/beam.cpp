@@ -8,7 +8,7 @@ BeamPass::BeamPass() : pipelines_(kBeamSpirv) {}
 
 Result<void> BeamPass::prepare(FrameResources& resources, const PassConstants& constants, bool beam) {
     PassConstants plain = constants;
-    plain.colour = plain.countSteps = plain.falseColour = false;
+    plain.colour = plain.countSteps = plain.falseColour = plain.seams = false;
     return pipelines_.choose(resources, plain, {beam ? 1u : 0u});
 }
 

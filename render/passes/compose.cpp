@@ -50,7 +50,7 @@ ComposePass::ComposePass() : pipelines_(kComposeSpirv) {}
 
 Result<void> ComposePass::prepare(FrameResources& resources, const PassConstants& constants, bool gathers) {
     PassConstants plain = constants;
-    plain.colour = plain.countSteps = plain.falseColour = false;
+    plain.colour = plain.countSteps = plain.falseColour = plain.seams = false;
     return pipelines_.choose(resources, plain, {gathers ? 1u : 0u});
 }
 

@@ -47,7 +47,7 @@ Result<void> FeedbackTarget::prepare(Device& device, FrameResources& resources,
 
 Result<void> FeedbackPass::prepare(FrameResources& resources, const PassConstants& constants) {
     PassConstants plain = constants;
-    plain.colour = plain.countSteps = plain.falseColour = false;
+    plain.colour = plain.countSteps = plain.falseColour = plain.seams = false;
     return pipelines_.choose(resources, plain);
 }
 

@@ -337,7 +337,8 @@ Result<void> PipelineVariants::choose(FrameResources& resources, const PassConst
         c.chunkShift,
         uint32_t(c.colour) + uint32_t(c.colour && c.images) + uint32_t(c.colour && c.images && c.channels),
         c.countSteps,
-        c.falseColour};
+        c.falseColour,
+        c.seams};
     values.insert(values.end(), more.begin(), more.end());
     ComputePipeline& variant = variants_[values];
     if (variant.handle() == VK_NULL_HANDLE) {

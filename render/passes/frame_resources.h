@@ -49,6 +49,7 @@ struct PassConstants {
     PageAccess access = PageAccess::TexelBuffer;
     uint32_t poolChunks = 1, chunkShift = 26;
     bool colour = false, images = false, channels = false, countSteps = false, falseColour = false;
+    bool seams = false;  ///< pages of different levels may leave gaps between them
     bool operator==(const PassConstants&) const = default;
 };
 

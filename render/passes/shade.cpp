@@ -8,7 +8,7 @@ ShadePass::ShadePass() : pipelines_(kShadeSpirv) {}
 
 Result<void> ShadePass::prepare(FrameResources& resources, const PassConstants& constants, ShadeLight light) {
     PassConstants plain = constants;
-    plain.countSteps = false;
+    plain.countSteps = plain.seams = false;
     plain.images = constants.channels;
     return pipelines_.choose(resources, plain, {uint32_t(light)});
 }

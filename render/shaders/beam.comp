@@ -10,7 +10,7 @@
 #include "render/shaders/bindings.glsl"
 #include "render/shaders/rays.glsl"
 
-layout(constant_id = 6) const uint kBeam = 1u;  // 0: every tile is listed, from distance 0
+layout(constant_id = 7) const uint kBeam = 1u;  // 0: every tile is listed, from distance 0
 layout(local_size_x = 8, local_size_y = 8) in;
 
 const int kMaxDepth = 34;        // page levels and levels of an octree in a page

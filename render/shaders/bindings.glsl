@@ -20,6 +20,8 @@ layout(constant_id = 2) const uint kChunkShift = 26u;  // log2 of 16-byte texels
 layout(constant_id = 3) const uint kColour = 0u;
 layout(constant_id = 4) const uint kCountSteps = 0u;
 layout(constant_id = 5) const uint kFalseColour = 0u;
+// 1: pages of different levels may leave gaps between them; 0: the surface of each page covers the mesh's within it
+layout(constant_id = 6) const uint kSeams = 0u;
 
 // clang-format off
 layout(set = 0, binding = 0, std140) uniform FrameBlock { FrameConstants frame; };

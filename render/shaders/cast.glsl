@@ -46,7 +46,7 @@ const int kNoRegion = 64;  // bits before the first one
 // Whether the surface steps from one level to another between two regions, one after the other on a ray, so that a ray
 // could pass between the two: pages of a covering dataset leave no such gap.
 bool levelChanges(Region before, Region after) {
-    return frame.isCovering == 0u && before.bits != kNoRegion &&
+    return kSeams != 0u && before.bits != kNoRegion &&
            ((before.isPage && after.bits < before.bits) || (after.isPage && after.bits > before.bits));
 }
 

@@ -13,7 +13,7 @@
 layout(local_size_x = 8, local_size_y = 8) in;
 
 layout(set = 0, binding = 13, std430) readonly buffer OwnPictureBlock { uint ownPixels[]; };
-layout(constant_id = 6) const uint kGathers = 0u;  // 1: normals and lifts in place of the picture
+layout(constant_id = 7) const uint kGathers = 0u;  // 1: normals and lifts in place of the picture
 
 void main() {
     uvec2 pixel;

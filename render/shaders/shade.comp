@@ -13,7 +13,7 @@
 #include "render/shaders/scene_light.glsl"
 
 // 0: none; 1: the hits have a plane of light; 2: the picture of several datasets has.
-layout(constant_id = 6) const uint kLight = 0u;
+layout(constant_id = 7) const uint kLight = 0u;
 layout(local_size_x = 8, local_size_y = 8) in;
 
 // Returns how much sky is seen, averaged over the pixels around that show the same surface: light.comp gives each pixel

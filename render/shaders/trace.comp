@@ -15,7 +15,7 @@ const uint kHitBy = kHitByCamera;
 #include "render/shared/hit_light.h"
 #include "render/shaders/channels.glsl"
 
-layout(constant_id = 6) const uint kSections =
+layout(constant_id = 7) const uint kSections =
     0u;  // 0: none; 1: planes that cut; 2: with filled caps; 3: of closed parts
 layout(local_size_x = 8, local_size_y = 8) in;
 

@@ -58,21 +58,20 @@ struct FrameConstants {
     float lightLift;                     // how far above the surface rays of light begin, in pixels
     uint lightPlane;                     // the hits' plane of light or false colours; below 2: there is none
     uint sectionCount;
-    uint occlusionRays;  // a pixel
-    uint hasShadows;     // 0 or 1
-    float paperEpsilon;  // of the method `paper`, finest cells
-    float worldPerCell;  // world units a finest cell
-    uint isCovering;     // 0 or 1: the surface of each page covers the mesh's within the page (kFlagCovering)
-    uint sampleNumber;   // of the pixels (render/pixel_samples.h): 0: their middles
+    uint occlusionRays;   // a pixel
+    uint hasShadows;      // 0 or 1
+    float paperEpsilon;   // of the method `paper`, finest cells
+    float worldPerCell;   // world units a finest cell
+    uint hasEnvironment;  // 0 or 1
+    uint sampleNumber;    // of the pixels (render/pixel_samples.h): 0: their middles
     // Rows of another picture that accumulate.comp adds this one to: from partRow on, partRows of them, for which this
     // one has skippedRows above (render/picture_parts.h).
     uint partRow, partRows, skippedRows;
     uint firstHitMark;  // word of the feedback buffer with the first mark of a page that was hit; 0: there are none
     vec4 rotation;      // quaternion: world from the dataset's axes
     uint lightCount;
-    float opacity;        // part of the samples in which the dataset is there
-    uint hasEnvironment;  // 0 or 1
-    uint unused0;
+    float opacity;  // part of the samples in which the dataset is there
+    uint unused0, unused1;
     vec4 moreLights[kMaxMoreLights];  // the other lights, as lightDirection
     // What has dot(xyz, p) + w >= 0 is kept; p in finest cells relative to originLattice.
     vec4 sections[kMaxSections];

@@ -44,6 +44,7 @@ PassConstants Renderer::View::constantsFor(const Layer& layer, const FrameReques
         c.colour = residency->hasColour();
         c.images = residency->images() != nullptr;
         c.channels = showsChannels(*residency, request);
+        c.seams = residency->dataset().header.levels > 1 && !residency->dataset().isCovering();
     }
     c.falseColour = hasHitNumbers(request.shading.mode);
     c.countSteps = request.countSteps || showsWork(request.shading.mode);

@@ -80,7 +80,7 @@ void expectSameLayout(std::span<const uint32_t> spirv) {
                                                                    OFFSET(hasShadows),
                                                                    OFFSET(paperEpsilon),
                                                                    OFFSET(worldPerCell),
-                                                                   OFFSET(isCovering),
+                                                                   OFFSET(hasEnvironment),
                                                                    OFFSET(sampleNumber),
                                                                    OFFSET(partRow),
                                                                    OFFSET(partRows),
@@ -89,8 +89,8 @@ void expectSameLayout(std::span<const uint32_t> spirv) {
                                                                    OFFSET(rotation),
                                                                    OFFSET(lightCount),
                                                                    OFFSET(opacity),
-                                                                   OFFSET(hasEnvironment),
                                                                    OFFSET(unused0),
+                                                                   OFFSET(unused1),
                                                                    OFFSET(moreLights),
                                                                    OFFSET(sections),
                                                                    OFFSET(environment)}));
