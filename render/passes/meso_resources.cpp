@@ -9,8 +9,8 @@ namespace vcp {
 
 namespace {
 
-constexpr VkDescriptorType kMesoBindings[] = {kUniform, kTexels,  kTexels,  kTexels,
-                                              kStorage, kStorage, kStorage, kTexels};
+constexpr VkDescriptorType kMesoBindings[] = {kUniform, kTexels,  kTexels, kTexels,  kStorage,
+                                              kStorage, kStorage, kTexels, kStorage, kStorage};
 constexpr uint32_t kMesoBindingCount = std::size(kMesoBindings);
 
 }  // namespace
@@ -32,6 +32,9 @@ Result<void> MesoResources::createLayout() {
     VkPipelineLayoutCreateInfo layout{VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO};
     layout.setLayoutCount = 1;
     layout.pSetLayouts = &setLayout_;
+    const VkPushConstantRange ray{VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof(frame::MesoLightRay)};
+    layout.pushConstantRangeCount = 1;
+    layout.pPushConstantRanges = &ray;
     VCP_VK(vkCreatePipelineLayout, device_.handle(), &layout, nullptr, &layout_);
     return {};
 }
@@ -89,7 +92,7 @@ Result<Buffer> MesoResources::storage(uint64_t bytes) const {
 }
 
 Result<MesoSet> MesoResources::makeSet(const Bound& bound) const {
-    const VkDescriptorPoolSize sizes[] = {{VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, 1}, {kTexels, 4}, {kStorage, 3}};
+    const VkDescriptorPoolSize sizes[] = {{VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, 1}, {kTexels, 4}, {kStorage, 5}};
     VkDescriptorPoolCreateInfo pool{VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO};
     pool.maxSets = 1;
     pool.poolSizeCount = std::size(sizes);
@@ -110,9 +113,20 @@ Result<MesoSet> MesoResources::makeSet(const Bound& bound) const {
                                                    VK_NULL_HANDLE,
                                                    VK_NULL_HANDLE,
                                                    VK_NULL_HANDLE,
-                                                   (bound.look != nullptr ? bound.look : bound.input)->view.handle()};
-    const Buffer* const buffers[kMesoBindingCount] = {bound.constants, nullptr,       nullptr,        nullptr,
-                                                      bound.hits,      bound.picture, bound.counters, nullptr};
+                                                   (bound.look != nullptr ? bound.look : bound.input)->view.handle(),
+                                                   VK_NULL_HANDLE,
+                                                   VK_NULL_HANDLE};
+    const auto orUnused = [&](const Buffer* buffer) { return buffer != nullptr ? buffer : bound.counters; };
+    const Buffer* const buffers[kMesoBindingCount] = {bound.constants,
+                                                      nullptr,
+                                                      nullptr,
+                                                      nullptr,
+                                                      bound.hits,
+                                                      bound.picture,
+                                                      bound.counters,
+                                                      nullptr,
+                                                      orUnused(bound.sceneLight),
+                                                      orUnused(bound.depths)};
     VkDescriptorBufferInfo infos[kMesoBindingCount] = {};
     VkWriteDescriptorSet writes[kMesoBindingCount];
     for (uint32_t i = 0; i < kMesoBindingCount; ++i) {

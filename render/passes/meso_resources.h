@@ -10,6 +10,10 @@
 //  5        picture, of the frame         shade pass, shade       readback, present
 //  6        counters                      surface, shade          readback
 //  7        appearance, textures          CPU (upload)            surface
+//  8, 9     planes of light and depths    gather, scene light,    scene light, shade
+//           of the whole picture          surface
+//
+// Push constants: the ray of light that is cast, MesoLightRay.
 #pragma once
 
 #include <map>
@@ -78,7 +82,8 @@ public:
         const Buffer* constants;
         const MesoTexels *words, *input;
         const Buffer *hits, *picture, *counters;
-        const MesoTexels* look = nullptr;  ///< null: the shaders read none
+        const MesoTexels* look = nullptr;                       ///< null: the shaders read none
+        const Buffer *sceneLight = nullptr, *depths = nullptr;  ///< null: surfaces and datasets do not shade each other
     };
     /// Makes a descriptor set. Errors: Device.
     Result<MesoSet> makeSet(const Bound& bound) const;

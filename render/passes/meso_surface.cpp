@@ -20,6 +20,11 @@ constexpr VkBufferUsageFlags kConstantsUse = VK_BUFFER_USAGE_UNIFORM_BUFFER_BIT 
 
 PictureSize sizeOf(const FrameRequest& request) { return {request.width, request.height}; }
 
+// What a pipeline casts (kRays of shaders/meso_surface.comp).
+constexpr uint32_t kPictureRays = 0, kRaysToLights = 1, kRayToLight = 2, kRayIntoSky = 3;
+
+VkBuffer handleOf(const Buffer* buffer) { return buffer != nullptr ? buffer->handle() : VK_NULL_HANDLE; }
+
 RemeshLook remeshLook(const FrameRequest& request) {
     return {request.camera, wholePicture(request), upperLeft(request), sizeOf(request)};
 }
@@ -81,7 +86,7 @@ uint64_t MesoSurfacePass::assetBytes() const {
     return sum;
 }
 
-Result<void> MesoSurfacePass::makeTarget(MesoTarget& target, PictureSize size, const Buffer& picture) {
+Result<void> MesoSurfacePass::makeTarget(MesoTarget& target, PictureSize size, const Picture& picture) {
     // The target has no size until all of it is made.
     target = {};
     for (const auto& [buffer, bytes] : {std::pair(&target.hits, size.pixels() * frame::kMesoPlanes * 4),
@@ -94,43 +99,53 @@ Result<void> MesoSurfacePass::makeTarget(MesoTarget& target, PictureSize size, c
     for (const Placed& surface : surfaces_) {
         const bool isRemeshed = surface.remeshed.surface != nullptr;
         const auto& [hits, normals] = target.remeshed.copies;
-        VCP_TRY_ASSIGN(auto set, resources_.makeSet({&surface.constants, isRemeshed ? &normals : surface.words.get(),
-                                                     isRemeshed ? &hits : &surface.shell, &target.hits, &picture,
-                                                     &target.counters, surface.look.get()}));
+        VCP_TRY_ASSIGN(auto set,
+                       resources_.makeSet({&surface.constants, isRemeshed ? &normals : surface.words.get(),
+                                           isRemeshed ? &hits : &surface.shell, &target.hits, picture.colours,
+                                           &target.counters, surface.look.get(), picture.sceneLight, picture.depths}));
         target.sets.push_back(std::move(set));
     }
-    target.size = size, target.surfaces = version_, target.picture = picture.handle();
+    target.size = size, target.surfaces = version_, target.picture = picture.colours->handle();
+    target.sceneLight = handleOf(picture.sceneLight);
     return {};
 }
 
-Result<void> MesoSurfacePass::choosePipelines(Placed& surface, bool shadows) {
-    std::vector<uint32_t> constants =
+Result<void> MesoSurfacePass::choosePipelines(Placed& surface, const Shading& shading, bool inScene) {
+    const std::vector<uint32_t> march =
         surface.arrays ? wordsOf(surface.arrays->constants) : wordsOf(meso::MarchConstants());
-    constants.push_back(0);
-    constants.push_back(surface.textures);
+    const auto choose = [&](std::span<const uint32_t> spirv, uint32_t rays, uint32_t textures) {
+        std::vector<uint32_t> constants = march;
+        constants.insert(constants.end(), {rays, textures, surface.isFarDrawn ? 1u : 0u, inScene ? 1u : 0u});
+        return resources_.pipeline(spirv, constants);
+    };
     if (surface.remeshed.surface) {
-        VCP_TRY_ASSIGN(surface.cast, resources_.pipeline(kRemeshMergeSpirv, constants));
+        VCP_TRY_ASSIGN(surface.cast, choose(kRemeshMergeSpirv, kPictureRays, surface.textures));
         return {};
     }
-    constants.push_back(surface.isFarDrawn ? 1 : 0);
-    VCP_TRY_ASSIGN(surface.cast, resources_.pipeline(kMesoSurfaceSpirv, constants));
-    if (!shadows) return {};
-    // The shadow pass reads no textures.
-    constants[4] = 1, constants[5] = 0;
-    VCP_TRY_ASSIGN(surface.shadow, resources_.pipeline(kMesoSurfaceSpirv, constants));
+    VCP_TRY_ASSIGN(surface.cast, choose(kMesoSurfaceSpirv, kPictureRays, surface.textures));
+    // Rays of light read no textures.
+    if (hasMesoShadows(shading)) {
+        VkPipeline& lights = inScene ? surface.sun : surface.shadow;
+        VCP_TRY_ASSIGN(lights, choose(kMesoSurfaceSpirv, inScene ? kRayToLight : kRaysToLights, 0));
+    }
+    if (inScene && shading.occlusionRays > 0) {
+        VCP_TRY_ASSIGN(surface.sky, choose(kMesoSurfaceSpirv, kRayIntoSky, 0));
+    }
     return {};
 }
 
-Result<void> MesoSurfacePass::prepare(MesoTarget& target, const Buffer& picture, const FrameRequest& request) {
+Result<void> MesoSurfacePass::prepare(MesoTarget& target, const Picture& picture, const FrameRequest& request) {
     const PictureSize size = sizeOf(request);
-    if (!(size == target.size) || target.surfaces != version_ || target.picture != picture.handle())
+    if (!(size == target.size) || target.surfaces != version_ || target.picture != picture.colours->handle() ||
+        target.sceneLight != handleOf(picture.sceneLight))
         VCP_TRY(makeTarget(target, size, picture));
+    const bool inScene = picture.sceneLight != nullptr;
     for (Placed& surface : surfaces_) {
-        VCP_TRY(choosePipelines(surface, hasMesoShadows(request.shading)));
+        VCP_TRY(choosePipelines(surface, request.shading, inScene));
         if (surface.remeshed.surface)
             VCP_TRY(raster_.remesh(target.remeshed, surface.number, surface.remeshed, remeshLook(request)));
     }
-    VCP_TRY_ASSIGN(shade_, resources_.pipeline(kMesoShadeSpirv, {}));
+    VCP_TRY_ASSIGN(shade_, resources_.pipeline(kMesoShadeSpirv, {0, 0, 0, 0, 0, 0, 0, inScene ? 1u : 0u}));
     return {};
 }
 
@@ -151,17 +166,21 @@ void MesoSurfacePass::dispatch(VkCommandBuffer commands, VkPipeline pipeline, co
     barrierComputeToCompute(commands);
 }
 
+void MesoSurfacePass::push(VkCommandBuffer commands, const frame::MesoLightRay& ray) const {
+    vkCmdPushConstants(commands, resources_.layout(), VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof ray, &ray);
+}
+
 MesoReport MesoTarget::report() const {
     MesoReport report;
     std::memcpy(&report, reported.mapped(), sizeof report);
     return report;
 }
 
-void MesoSurfacePass::record(VkCommandBuffer commands, const MesoTarget& target, const FrameRequest& request,
-                             const Buffer& depths, const std::optional<PicturePixel>& cursor) {
+void MesoSurfacePass::recordHits(VkCommandBuffer commands, const MesoTarget& target, const FrameRequest& request,
+                                 const Picture& picture) {
     const uint64_t plane = target.size.pixels() * 4;
     const VkBufferCopy region{0, 0, plane};
-    vkCmdCopyBuffer(commands, depths.handle(), target.hits.handle(), 1, &region);
+    vkCmdCopyBuffer(commands, picture.depths->handle(), target.hits.handle(), 1, &region);
     vkCmdFillBuffer(commands, target.hits.handle(), plane, (frame::kMesoPlanes - 1) * plane, 0);
     vkCmdFillBuffer(commands, target.counters.handle(), 0, VK_WHOLE_SIZE, 0);
     for (const Placed& surface : surfaces_) {
@@ -169,14 +188,35 @@ void MesoSurfacePass::record(VkCommandBuffer commands, const MesoTarget& target,
         vkCmdUpdateBuffer(commands, surface.constants.handle(), 0, sizeof constants, &constants);
     }
     barrierToAll(commands);
+    push(commands, {});
     for (size_t i = 0; i < surfaces_.size(); ++i) {
         if (surfaces_[i].remeshed.surface)
             raster_.record(commands, target.remeshed, surfaces_[i].number, surfaces_[i].remeshed, remeshLook(request));
         dispatch(commands, surfaces_[i].cast, target, i);
     }
-    if (hasMesoShadows(request.shading))
+}
+
+void MesoSurfacePass::recordRay(VkCommandBuffer commands, const MesoTarget& target, const frame::MesoLightRay& ray) {
+    std::vector<size_t> marched;
+    for (size_t i = 0; i < surfaces_.size(); ++i)
+        if (!surfaces_[i].remeshed.surface) marched.push_back(i);
+    frame::MesoLightRay through = ray;
+    for (const size_t i : marched) {
+        through.isFirst = ray.isFirst != 0 && i == marched.front() ? 1 : 0;
+        through.isLast = ray.isLast != 0 && i == marched.back() ? 1 : 0;
+        push(commands, through);
+        const bool isSun = ray.number > frame::kSunRay - frame::kMaxLights;
+        dispatch(commands, isSun ? surfaces_[i].sun : surfaces_[i].sky, target, i);
+    }
+}
+
+void MesoSurfacePass::recordShade(VkCommandBuffer commands, const MesoTarget& target, const FrameRequest& request,
+                                  const std::optional<PicturePixel>& cursor) {
+    const uint64_t plane = target.size.pixels() * 4;
+    if (target.sceneLight == VK_NULL_HANDLE && hasMesoShadows(request.shading))
         for (size_t i = 0; i < surfaces_.size(); ++i)
             if (!surfaces_[i].remeshed.surface) dispatch(commands, surfaces_[i].shadow, target, i);
+    push(commands, {.occlusionRays = request.shading.occlusionRays});
     dispatch(commands, shade_, target, 0);
     barrierComputeToReadback(commands);
     const VkBufferCopy counts{0, offsetof(MesoReport, counts), sizeof(MesoCounts)};

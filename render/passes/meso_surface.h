@@ -4,6 +4,10 @@
 // the others and cast none. Normals are as the other passes pack them; depths are in world units, as those of the
 // compose pass, from which they start.
 //
+// Where surfaces and datasets shade each other, the hits are found before any ray of light is cast (recordHits) and
+// stand in the whole picture's depths and planes of light (passes/scene_light.h); each ray goes through the surfaces
+// after the datasets (recordRay), and the shading comes last.
+//
 // Reads shells, assets and the composed depths; writes hits, picture, counters. Barriers are recorded here; ends with
 // barrierComputeToReadback. Without surfaces nothing is made: no pipeline, no buffer.
 #pragma once
@@ -37,8 +41,9 @@ struct MesoTarget {
     PictureSize size;       ///< 0: nothing is made
     uint64_t surfaces = 0;  ///< MesoSurfacePass::version() for which the sets were made
     Buffer hits, counters;
-    Buffer reported;                    ///< MesoReport
-    VkBuffer picture = VK_NULL_HANDLE;  ///< not owned; in the sets
+    Buffer reported;                       ///< MesoReport
+    VkBuffer picture = VK_NULL_HANDLE;     ///< not owned; in the sets
+    VkBuffer sceneLight = VK_NULL_HANDLE;  ///< the same; null where surfaces and datasets do not shade each other
     RemeshTarget remeshed;
     std::vector<MesoSet> sets;  ///< one for each surface
 
@@ -54,13 +59,24 @@ public:
     /// Replaces the surfaces; waits for nothing: no frame may be in flight. On an error there are none. Errors: Device,
     /// Limit.
     Result<void> setSurfaces(std::span<const MesoSurface> surfaces);
+    /// What the surfaces are drawn over.
+    struct Picture {
+        const Buffer* colours;     ///< what is seen without mesostructure, when the surfaces are shaded
+        const Buffer* depths;      ///< a float a pixel, world units along the unit ray
+        const Buffer* sceneLight;  ///< planes of light; null where surfaces and datasets do not shade each other
+    };
     /// Makes buffers and pipelines, and remeshes. Precondition: there are surfaces, and no frame in flight uses the
     /// target. Errors: Device, Limit, Unsupported.
-    Result<void> prepare(MesoTarget& target, const Buffer& picture, const FrameRequest& request);
-    /// Records the surfaces' passes. Precondition: prepare(); the picture shows what is seen without mesostructure.
-    /// `depths`: a float a pixel, world units along the unit ray, of what the picture shows.
-    void record(VkCommandBuffer commands, const MesoTarget& target, const FrameRequest& request, const Buffer& depths,
-                const std::optional<PicturePixel>& cursor);
+    Result<void> prepare(MesoTarget& target, const Picture& picture, const FrameRequest& request);
+    /// Records what finds the hits. Precondition: prepare() with the same picture.
+    void recordHits(VkCommandBuffer commands, const MesoTarget& target, const FrameRequest& request,
+                    const Picture& picture);
+    /// Records a ray of light from all that the picture shows. `ray.isLast`: nothing comes after the surfaces.
+    /// Precondition: recordHits() with planes of light.
+    void recordRay(VkCommandBuffer commands, const MesoTarget& target, const frame::MesoLightRay& ray);
+    /// Records shading, and without planes of light the shadows before it.
+    void recordShade(VkCommandBuffer commands, const MesoTarget& target, const FrameRequest& request,
+                     const std::optional<PicturePixel>& cursor);
 
     [[nodiscard]] uint64_t version() const { return version_; }
     /// Bytes of assets, shells and textures.
@@ -78,11 +94,14 @@ private:
         frame::MesoView view{};  ///< what does not depend on the picture
         uint32_t textures = 0;
         bool isFarDrawn = false;
-        VkPipeline cast = VK_NULL_HANDLE, shadow = VK_NULL_HANDLE;
+        /// `sun` and `sky` cast one ray from all that is seen.
+        VkPipeline cast = VK_NULL_HANDLE, shadow = VK_NULL_HANDLE, sun = VK_NULL_HANDLE, sky = VK_NULL_HANDLE;
     };
-    Result<void> makeTarget(MesoTarget& target, PictureSize size, const Buffer& picture);
-    Result<void> choosePipelines(Placed& surface, bool shadows);
+    Result<void> makeTarget(MesoTarget& target, PictureSize size, const Picture& picture);
+    Result<void> choosePipelines(Placed& surface, const Shading& shading, bool inScene);
     MesoConstants constantsOf(const Placed& surface, const FrameRequest& request) const;
+    /// Records the ray that the next dispatches cast.
+    void push(VkCommandBuffer commands, const frame::MesoLightRay& ray) const;
     void dispatch(VkCommandBuffer commands, VkPipeline pipeline, const MesoTarget& target, size_t surface) const;
 
     Device& device_;

@@ -30,6 +30,10 @@ layout(set = 0, binding = 5, std430) buffer PictureBlock { uint picturePixels[];
 // Unresolved rays; hits from far; pixels that anything is hit in.
 layout(set = 0, binding = 6, std430) buffer CounterBlock { uint counters[]; };
 layout(set = 0, binding = 7) uniform textureBuffer lookTexels;  // what is seen from far, textures
+// Of pictures in which surfaces and datasets shade each other: planes of light (scene_planes.glsl), and depths of all.
+layout(set = 0, binding = 8, std430) buffer SceneLightBlock { uint sceneLight[]; };
+layout(set = 0, binding = 9, std430) buffer TargetDepthBlock { uint targetDepths[]; };
+layout(push_constant) uniform RayBlock { MesoLightRay ray; };
 
 uint fetchWord(uint i) { return texelFetch(wordTexels, int(i)).x; }
 uvec4 fetchQuad(uint i) { return texelFetch(quadTexels, int(i)); }

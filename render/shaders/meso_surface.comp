@@ -1,19 +1,26 @@
-// Casts a picture's rays through the shell of one surface (mesostructure/shell.h), and shadow rays from the hits on all
-// surfaces.
-// Reads and writes the hits: depth, normal, look and light, iterations. A surface replaces what is farther.
+// Casts a picture's rays through the shell of one surface (mesostructure/shell.h), and rays of light: towards the lights
+// from the hits on all surfaces, or, where surfaces and datasets shade each other, one ray from all that is seen.
+// Reads and writes the hits: depth, normal, look and light, iterations. A surface replaces what is farther. With kScene
+// the depths and planes of light of the whole picture are written, too.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #include "render/shaders/meso_bindings.glsl"
 #include "render/shaders/meso_march.glsl"
 
-layout(constant_id = 4) const uint kShadow = 0u;    // 1: from the hits towards the lights
+// What is cast. 0: the picture's rays; 1: towards the lights from hits on surfaces; 2: `ray`, towards a light; 3: `ray`,
+// into the sky.
+layout(constant_id = 4) const uint kRays = 0u;
+const uint kShadow = kRays == 1u || kRays == 2u ? 1u : 0u;
 layout(constant_id = 5) const uint kTextures = 0u;  // kMesoColours, kMesoNormals
 layout(constant_id = 6) const uint kFromFar = 0u;  // 1: slabs that are less high than a part of a pixel are not marched
+layout(constant_id = 7) const uint kScene = 0u;   // 1: surfaces and datasets shade each other
 layout(local_size_x = 8, local_size_y = 8) in;
 
 uint fetchHit(uint i) { return hits[i]; }
 #include "render/shaders/hit_records.glsl"
 #include "render/shared/shell_cast.h"
+#include "render/shared/hit_light.h"
+#include "render/shaders/meso_scene.glsl"
 
 // Finds which of the lights do not reach a hit.
 void castShadows(uint index, vec3 from, vec3 n) {
@@ -33,6 +40,36 @@ void castShadows(uint index, vec3 from, vec3 n) {
     hits[at] = light;
 }
 
+// Returns where a ray of light is stopped, within `reach`; else `reach`.
+float castLight(vec3 from, vec3 direction, float reach) {
+    ShellKept kept = keptPart(from, direction);
+    float left = min(reach, kept.last) - kept.first;
+    if (left <= 0.0) return reach;
+    ShellHit hit = castShell(from + kept.first * direction, direction, left);
+    if (hit.unresolved) atomicAdd(counters[0], 1u);
+    return hit.t < left ? kept.first + hit.t : reach;
+}
+
+// Casts `ray` from the place that a pixel shows.
+void castSceneRay(uvec2 pixel, uint index, vec3 place) {
+    vec3 n = unpackHitNormal(sceneLight[sceneAt(kSceneNormal, index)]);
+    float lift = uintBitsToFloat(sceneLight[sceneAt(kSceneLift, index)]);
+    bool onSurface = hits[kMesoPlaneNormal * scenePlane() + index] != 0u, isFar = lift < 0.0;
+    vec3 from = place + (onSurface ? view.shadowLift : lift) * n;
+    if (kRays == 2u) {
+        uint number = kSunRay - ray.number, bits = lightBits(number);
+        vec3 towards = view.lights[number].xyz;
+        uint seen = lightBefore(index, number == 0u && ray.isFirst != 0u && ray.occlusionRays == 0u);
+        bool blocked = !isFar && dot(n, towards) <= 0.0;
+        if (!blocked && (seen & bits) != 0u) blocked = castLight(from, towards, kMesoNoHit) < kMesoNoHit;
+        sceneLight[sceneAt(kSceneLight, index)] = blocked ? seen & ~bits : seen;
+        return;
+    }
+    float near = ray.isFirst != 0u ? ray.reach : min(ray.reach, uintBitsToFloat(sceneLight[sceneAt(kSceneNear, index)]));
+    near = castLight(from, skyDirection(n, ray.number, ray.occlusionRays, pixel.x, pixel.y, ray.sampleNumber), near);
+    keepSkyRay(index, near, ray.number, ray.occlusionRays, ray.isLast != 0u, ray.reach);
+}
+
 void main() {
     uvec2 pixel = gl_GlobalInvocationID.xy;
     if (pixel.x >= view.width || pixel.y >= view.height) return;
@@ -43,7 +80,14 @@ void main() {
     float depth = uintBitsToFloat(hits[kMesoPlaneDepth * plane + index]);
     widthAtStart = length(view.eyeX.xyz);
     widthGrowth = length(view.forwardX.xyz) / length(towards);
-    if (kShadow != 0u) {
+    if (kRays > 1u) {
+        if (depth >= kMesoNoHit) return;
+        widthAtStart = pixelWidth(depth);
+        widthGrowth = 0.0;
+        castSceneRay(pixel, index, eye + depth * d);
+        return;
+    }
+    if (kRays == 1u) {
         uint code = hits[kMesoPlaneNormal * plane + index];
         if (code == 0u) return;
         widthAtStart = pixelWidth(depth);
@@ -65,9 +109,10 @@ void main() {
     vec3 n = normalize(hit.normal);
     ShellLook look = lookOf(hit, eye + hit.t * d, d, pixelWidth(hit.t), n);
     if (dot(n, d) > 0.0) n -= dot(n, d) * d;
+    uint code = max(packHitNormal(normalize(n)), 1u);  // 0 means that a pixel has no mesostructure
     hits[kMesoPlaneDepth * plane + index] = floatBitsToUint(kept.first + hit.t);
-    // 0 means that a pixel has no mesostructure.
-    hits[kMesoPlaneNormal * plane + index] = max(packHitNormal(normalize(n)), 1u);
+    hits[kMesoPlaneNormal * plane + index] = code;
     hits[kMesoPlaneLook * plane + index] = packUnorm4x8(vec4(look.colour, look.sky));
     hits[kMesoPlaneLight * plane + index] = packUnorm4x8(look.light);
+    if (kScene != 0u) keepInScene(index, kept.first + hit.t, code, look.sky < 1.0);
 }

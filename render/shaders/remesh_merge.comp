@@ -4,11 +4,14 @@
 #include "render/shaders/meso_bindings.glsl"
 
 layout(constant_id = 5) const uint kTextures = 0u;  // kMesoColours
+layout(constant_id = 7) const uint kScene = 0u;     // 1: surfaces and datasets shade each other
 layout(local_size_x = 8, local_size_y = 8) in;
 
 uint fetchHit(uint i) { return hits[i]; }
 #include "render/shaders/hit_records.glsl"
 #include "render/shared/meso_texture_lookup.h"
+#include "render/shared/hit_light.h"
+#include "render/shaders/meso_scene.glsl"
 
 void main() {
     uvec2 pixel = gl_GlobalInvocationID.xy;
@@ -19,10 +22,11 @@ void main() {
     vec4 surface = uintBitsToFloat(fetchQuad(index));
     vec4 look = vec4(view.colour, 1.0);
     if (kTextures != 0u) look.xyz = encodedColour(sampleTexture(view.colours, hit.yz, surface.w).xyz);
+    uint code = max(packHitNormal(surface.xyz), 1u);  // 0 means that a pixel has no mesostructure
     hits[kMesoPlaneDepth * plane + index] = floatBitsToUint(hit.x);
-    // 0 means that a pixel has no mesostructure.
-    hits[kMesoPlaneNormal * plane + index] = max(packHitNormal(surface.xyz), 1u);
+    hits[kMesoPlaneNormal * plane + index] = code;
     hits[kMesoPlaneLook * plane + index] = packUnorm4x8(look);
     hits[kMesoPlaneLight * plane + index] = ~0u;  // before shadows, all of each light arrives
     hits[kMesoPlaneIterations * plane + index] += 1u;
+    if (kScene != 0u) keepInScene(index, hit.x, code, false);
 }

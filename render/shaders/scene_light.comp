@@ -36,18 +36,17 @@ void main() {
     float depth = sceneDepth(at);
     if (depth >= kNoHit) return;
     vec3 n = unpackHitNormal(sceneLight[sceneAt(kSceneNormal, at)]);
-    float lift = uintBitsToFloat(sceneLight[sceneAt(kSceneLift, at)]);
+    float keptLift = uintBitsToFloat(sceneLight[sceneAt(kSceneLift, at)]), lift = abs(keptLift);
     bool isSun = light.number > kSunRay - kMaxLights;
     uint number = isSun ? kSunRay - light.number : 0u, bits = bitsOfLight(number);
     vec3 sun = turnedBy(frame.rotation.xyz, frame.rotation.w, lightNumbered(number).xyz);
-    bool lit = dot(n, sun) > 0.0;
-    uint sky = frame.occlusionRays, lightAt = sceneAt(kSceneLight, at), nearAt = sceneAt(kSceneNear, at);
+    bool lit = keptLift < 0.0 || dot(n, sun) > 0.0;
+    uint sky = frame.occlusionRays;
 
     // Where pages are marked, each ray goes through each dataset.
     bool marks = frame.firstHitMark != 0u;
-    float near = isSun || light.isFirst != 0u ? kNoHit : uintBitsToFloat(sceneLight[nearAt]);
-    bool isFirstOfAll = light.number == kSunRay && light.isFirst != 0u && sky == 0u;
-    uint seen = isFirstOfAll ? packUnorm4x8(vec4(1.0, 1.0, 0.0, 0.0)) : sceneLight[lightAt];
+    float near = isSun || light.isFirst != 0u ? kNoHit : uintBitsToFloat(sceneLight[sceneAt(kSceneNear, at)]);
+    uint seen = lightBefore(at, light.number == kSunRay && light.isFirst != 0u && sky == 0u);
     vec3 direction = isSun ? sun : skyDirection(n, light.number, sky, pixel.x, pixel.y, frame.sampleNumber);
     Ray ray = lightRay(pixel, depth, lift, n, direction);
     float radius = isSun ? kNoHit : marks ? frame.occlusionReach : min(frame.occlusionReach, near / frame.worldPerCell);
@@ -57,17 +56,9 @@ void main() {
     Hit hit = castRay(ray, needed ? 0.0 : kNoHit, reach, work);
     bool blocked = hit.depth < reach;
     if (isSun) {
-        sceneLight[lightAt] = blocked || !lit ? seen & ~bits : seen;
+        sceneLight[sceneAt(kSceneLight, at)] = blocked || !lit ? seen & ~bits : seen;
         return;
     }
     if (blocked) near = min(near, hit.depth * frame.worldPerCell);
-    if (light.isLast == 0u) {
-        sceneLight[nearAt] = floatBitsToUint(near);
-        return;
-    }
-    // The sum over the rays becomes light with the last one.
-    float part = near / (frame.occlusionReach * frame.worldPerCell);
-    float open = (light.number == 0u ? 0.0 : uintBitsToFloat(seen)) + (part < 1.0 ? skyBehind(part) : 1.0);
-    sceneLight[lightAt] =
-        light.number + 1u < sky ? floatBitsToUint(open) : packUnorm4x8(vec4(1.0, open / float(sky), 0.0, 0.0));
+    keepSkyRay(at, near, light.number, sky, light.isLast != 0u, frame.occlusionReach * frame.worldPerCell);
 }

@@ -3,8 +3,8 @@
 layout(set = 0, binding = 16, std430) buffer TargetPictureBlock { uint targetPixels[]; };
 // Bits of floats, world units; behind them the count of pixels that something is hit in.
 layout(set = 0, binding = 17, std430) buffer TargetDepthBlock { uint targetDepths[]; };
-// Planes of width * height words: see kSceneNormal and what follows it.
 layout(set = 0, binding = 20, std430) buffer SceneLightBlock { uint sceneLight[]; };
 
-uint sceneAt(uint plane, uint pixel) { return plane * frame.width * frame.height + pixel; }
+uint scenePlane() { return frame.width * frame.height; }
+#include "render/shaders/scene_planes.glsl"
 float sceneDepth(uint pixel) { return uintBitsToFloat(targetDepths[pixel]); }

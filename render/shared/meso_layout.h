@@ -20,6 +20,15 @@ const uint kMesoPlanes = 5u;
 const uint kMesoMaxSections = 6u;
 const uint kMesoMaxLights = 4u;
 
+// A ray of light through surfaces from what a picture shows, whatever that is (FrameConstants, SceneRay).
+struct MesoLightRay {
+    uint number;           // of the rays into the sky; kSunRay, of the first light, and the numbers below it of the others
+    uint isFirst, isLast;  // 1: of all that the ray goes through
+    uint occlusionRays, sampleNumber;
+    float reach;  // of occlusion, world units
+    uint unused0, unused1;
+};
+
 // A texture over the tile, with its smaller levels.
 struct MesoImage {
     uint first;  // texel

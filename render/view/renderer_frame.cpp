@@ -167,11 +167,15 @@ void Renderer::View::record(VkCommandBuffer commands, Frame& frame, const FrameS
             shared->compose.record(commands, *drawing.resources);
             return barrierToAll(commands);
         case FrameStep::Pass::SceneLight:
+        case FrameStep::Pass::SurfaceLight:
             if (tiles.first == 0 && &step == frame.firstLight()) {
                 frame.lightTimer.reset(commands);
                 frame.lightTimer.mark(commands, 0);
             }
+            if (step.pass == FrameStep::Pass::SurfaceLight) return recordSurfaceRay(commands, frame, step.ray);
             return shared->sceneLight.record(commands, *drawing.resources, step.ray, tiles);
+        case FrameStep::Pass::Surfaces:
+            return recordSurfaceHits(commands, frame);
         case FrameStep::Pass::Shade:
             return recordShade(commands, frame, step.layer);
     }
@@ -225,14 +229,39 @@ void Renderer::View::recordShade(VkCommandBuffer commands, Frame& frame, size_t 
     if (shared->composes() && (!frame.isLit || i == 0)) frame.target.recordReadback(commands);
 }
 
-Result<void> Renderer::View::recordSurfaces(VkCommandBuffer commands, Frame& frame) {
-    const Shared::Meso& meso = *shared->meso;
-    const Buffer& picture = frame.layers.front().resources->picture();
-    VCP_TRY(meso.pass->prepare(frame.surfaces, picture, frame.request));
+MesoSurfacePass::Picture Renderer::View::underSurfaces(const Frame& frame) {
+    return {&frame.layers.front().resources->picture(), &frame.target.depths(),
+            frame.isLit ? frame.target.light() : nullptr};
+}
+
+void Renderer::View::recordSurfaceHits(VkCommandBuffer commands, const Frame& frame) const {
     frame.surfacesTimer.reset(commands);
     frame.surfacesTimer.mark(commands, 0);
-    meso.pass->record(commands, frame.surfaces, frame.request, frame.target.depths(), frame.cursor);
-    frame.surfacesTimer.mark(commands, 1);
+    shared->meso->pass->recordHits(commands, frame.surfaces, frame.request, underSurfaces(frame));
+    if (frame.isLit) frame.surfacesTimer.mark(commands, 1);
+}
+
+void Renderer::View::recordSurfaceRay(VkCommandBuffer commands, const Frame& frame, const frame::SceneRay& ray) const {
+    const Shading& shading = frame.request.shading;
+    const double reach = shading.occlusionRadius > 0 ? shading.occlusionRadius : occlusionRadius();
+    shared->meso->pass->recordRay(commands, frame.surfaces,
+                                  {.number = ray.number,
+                                   .isFirst = ray.isFirst,
+                                   .isLast = ray.isLast,
+                                   .occlusionRays = shading.occlusionRays,
+                                   .sampleNumber = frame.request.sample,
+                                   .reach = float(reach)});
+}
+
+/// Records what comes after the datasets' passes.
+Result<void> Renderer::View::recordSurfaces(VkCommandBuffer commands, Frame& frame) {
+    const Shared::Meso& meso = *shared->meso;
+    if (!frame.isLit) {
+        VCP_TRY(meso.pass->prepare(frame.surfaces, underSurfaces(frame), frame.request));
+        recordSurfaceHits(commands, frame);
+    }
+    meso.pass->recordShade(commands, frame.surfaces, frame.request, frame.cursor);
+    if (!frame.isLit) frame.surfacesTimer.mark(commands, 1);
     frame.stats.pipelines += meso.resources->pipelinesMade();
     frame.stats.surfaceBytes = meso.pass->assetBytes();
     return {};
@@ -361,15 +390,22 @@ uint64_t Renderer::View::raysOf(const FrameRequest& request) const {
 }
 
 bool Renderer::View::isLit(const FrameRequest& request) const {
+    if (!hasLight(request.shading)) return false;
     const auto shown = std::count_if(layers.begin(), layers.end(), [](const Layer& layer) { return layer.casts(); });
-    return hasLight(request.shading) && shown > 1;
+    if (!shared->meso) return shown > 1;
+    // Surfaces alone cast shadows on each other by themselves.
+    return shown > 0 || (shared->meso->marches() && request.shading.occlusionRays > 0);
 }
 
 double Renderer::View::occlusionRadius() const {
     std::vector<PictureDataset> shown;
     for (const Layer& layer : layers)
         if (layer.casts()) shown.push_back({layer.residency->dataset(), layer.placement});
-    return occlusionRadiusAmong(shown);
+    std::vector<WorldBox> boxes;
+    if (shared->meso)
+        for (const MesoSurface& each : shared->meso->surfaces)
+            if (each.arrays) boxes.push_back({each.shell.low, each.shell.high});
+    return occlusionRadiusAmong(shown, boxes);
 }
 
 /// All datasets are traced before any ray of light is cast. The first one is shaded last: of surfaces at one place it
@@ -383,9 +419,13 @@ std::vector<FrameStep> Renderer::View::litStepsOf(const FrameRequest& request) c
         steps.push_back({FrameStep::Pass::Trace, i, layers[i].isPaper() ? 0u : 1u});
         steps.push_back({FrameStep::Pass::Gather, i, 0});
     }
+    if (shared->meso) steps.push_back({FrameStep::Pass::Surfaces, 0, 0});
+    const bool marches = shared->meso && shared->meso->marches();
     const auto addRay = [&](uint32_t ray) {
         for (const size_t i : casters)
-            steps.push_back({FrameStep::Pass::SceneLight, i, 1, {ray, i == casters.front(), i == casters.back(), 0}});
+            steps.push_back(
+                {FrameStep::Pass::SceneLight, i, 1, {ray, i == casters.front(), i == casters.back() && !marches, 0}});
+        if (marches) steps.push_back({FrameStep::Pass::SurfaceLight, 0, 0, {ray, casters.empty(), 1, 0}});
     };
     for (uint32_t ray = 0; ray < request.shading.occlusionRays; ++ray) addRay(ray);
     const auto lights = uint32_t(1 + request.shading.moreLights.size());
@@ -468,12 +508,14 @@ Result<void> Renderer::View::submitSteps(Frame& frame, bool one) {
         const FrameStep& step = frame.steps[frame.nextStep];
         if (step.pass == FrameStep::Pass::Beam) {
             VCP_TRY(prepare(frame, step.layer));
-        } else if (bound != step.layer) {
+        } else if (step.pass == FrameStep::Pass::Surfaces) {
+            VCP_TRY(shared->meso->pass->prepare(frame.surfaces, underSurfaces(frame), frame.request));
+        } else if (!step.isOfSurfaces() && bound != step.layer) {
             VCP_TRY(choosePipelines(frame, step.layer));
             frame.layers[step.layer].resources->bind(commands);
         }
         record(commands, frame, step, takeTiles(frame, one));
-        bound = step.layer;
+        bound = step.isOfSurfaces() ? std::nullopt : std::optional(step.layer);
         if (one && step.pass == FrameStep::Pass::Beam) frame.layers[step.layer].resources->recordListedTiles(commands);
         goesOn = !one;
     }

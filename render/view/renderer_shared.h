@@ -56,6 +56,12 @@ struct Renderer::Shared {
         std::vector<PreparedSurface> prepared;  // of them, where the processor casts the rays; else none
         std::unique_ptr<MesoResources> resources;
         std::unique_ptr<MesoSurfacePass> pass;
+
+        /// Whether rays go through any of them.
+        [[nodiscard]] bool marches() const {
+            return std::any_of(surfaces.begin(), surfaces.end(),
+                               [](const MesoSurface& each) { return bool(each.arrays); });
+        }
     };
     std::unique_ptr<Meso> meso;  // null: there are none
     uint64_t mesoVersion = 0;    // counts setSurfaces

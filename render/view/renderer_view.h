@@ -31,12 +31,15 @@ constexpr uint32_t kPassMarks = 6;
 /// which the device can do other things: a step is a pass, or, where rays are cast, as many tiles of it as take a short
 /// time.
 struct FrameStep {
-    /// Gather and SceneLight: of pictures whose datasets shade each other.
-    enum class Pass { Beam, Trace, Light, Gather, SceneLight, Shade };
+    /// Gather and SceneLight: of pictures in which datasets and surfaces shade each other; Surfaces finds what is hit
+    /// of these there, SurfaceLight casts a ray through them.
+    enum class Pass { Beam, Trace, Light, Gather, Surfaces, SceneLight, SurfaceLight, Shade };
     Pass pass = Pass::Beam;
     size_t layer = 0;
     uint32_t raysPerPixel = 0;  // 0: the pass is not parted
-    frame::SceneRay ray{};      // of SceneLight
+    frame::SceneRay ray{};      // of SceneLight and SurfaceLight
+
+    [[nodiscard]] bool isOfSurfaces() const { return pass == Pass::Surfaces || pass == Pass::SurfaceLight; }
 };
 
 struct Renderer::View {
@@ -104,7 +107,7 @@ struct Renderer::View {
         ComposeTarget target;            // pictures are composed into it
         MesoTarget surfaces;
         PassTimer surfacesTimer, lightTimer;
-        bool isLit = false;  // the datasets shade each other
+        bool isLit = false;  // datasets and surfaces shade each other
         FrameRequest request;
         std::vector<FrameStep> steps;
         size_t nextStep = 0;              // the first one that is not wholly submitted
@@ -121,8 +124,9 @@ struct Renderer::View {
         [[nodiscard]] bool isUnfinished() const { return nextStep < steps.size(); }
         /// The first step that casts light through several datasets, or the end.
         [[nodiscard]] const FrameStep* firstLight() const {
-            return &*std::find_if(steps.begin(), steps.end(),
-                                  [](const FrameStep& step) { return step.pass == FrameStep::Pass::SceneLight; });
+            return &*std::find_if(steps.begin(), steps.end(), [](const FrameStep& step) {
+                return step.pass == FrameStep::Pass::SceneLight || step.pass == FrameStep::Pass::SurfaceLight;
+            });
         }
         [[nodiscard]] const Buffer& picture() const {
             return cast ? cast->colours : layers.front().resources->picture();
@@ -230,6 +234,9 @@ struct Renderer::View {
     void recordBeam(VkCommandBuffer commands, Frame& frame, size_t layer);
     void recordShade(VkCommandBuffer commands, Frame& frame, size_t layer);
     /// Records the surfaces, over the datasets' picture.
+    [[nodiscard]] static MesoSurfacePass::Picture underSurfaces(const Frame& frame);
+    void recordSurfaceHits(VkCommandBuffer commands, const Frame& frame) const;
+    void recordSurfaceRay(VkCommandBuffer commands, const Frame& frame, const frame::SceneRay& ray) const;
     Result<void> recordSurfaces(VkCommandBuffer commands, Frame& frame);
 
     /// Takes in frames that have ended, in their order. Never waits. Errors: Device.

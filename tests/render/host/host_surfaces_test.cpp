@@ -306,20 +306,60 @@ TEST_F(HostSurfaces, ScanAndReliefCastShadowsOnEachOther) {
         std::vector<MesoSurface> surfaces{mesoSurface(plateau(), "boxes", "quad", 0.5)};
         // Where shadow rays start is not part of the closed forms, and its texels are wide.
         surfaces[0].lift = 1e-3;
-        ASSERT_TRUE(host_->open({{scene.dataset, scene.source, truth.placement()}}, surfaces));
-        FrameRequest request = lookFrom(camera);
-        request.width = 400, request.height = 300;
-        request.shading.lightDirection = light;
-        const Picture lit = test::drawnBy(*host_, request).picture;
-        request.shading.shadows = true;
-        const Picture shadowed = test::drawnBy(*host_, request).picture;
-        const ShadowCounts counts = countShadows(truth, request, lit, shadowed);
-        EXPECT_EQ(counts.wrong, 0u);
-        const bool fromAbove = light.z > 0;
-        EXPECT_GT(fromAbove ? counts.onSlab[1] : counts.onBall[1], 900u);
-        EXPECT_GT(counts.onBall[0], 1000u);
-        EXPECT_LT(counts.doubtful, 12000u);
+        const std::array<PictureRenderer*, 2> both{host_.get(), renderer_.get()};
+        for (PictureRenderer* const each : both) {
+            SCOPED_TRACE(each->device().name);
+            ASSERT_TRUE(each->open({{scene.dataset, scene.source, truth.placement()}}, surfaces));
+            FrameRequest request = lookFrom(camera);
+            request.width = 400, request.height = 300;
+            request.shading.lightDirection = light;
+            const Picture lit = test::drawnBy(*each, request).picture;
+            request.shading.shadows = true;
+            const Picture shadowed = test::drawnBy(*each, request).picture;
+            const ShadowCounts counts = countShadows(truth, request, lit, shadowed);
+            EXPECT_EQ(counts.wrong, 0u);
+            const bool fromAbove = light.z > 0;
+            EXPECT_GT(fromAbove ? counts.onSlab[1] : counts.onBall[1], 900u);
+            EXPECT_GT(counts.onBall[0], 1000u);
+            EXPECT_LT(counts.doubtful, 12000u);
+        }
     }
+}
+
+// Of several surfaces and datasets, in lights, samples and from far.
+TEST_F(HostSurfaces, WhatTheyCastOnEachOtherIsTheSame) {
+    const auto scene = test::sphereScene(1);
+    const BallOverSlab truth{{0.1, -0.05, 0.65}};
+    MesoSurface small = mesoSurface(relief(), "boxes", "quad", 0.004, 200, {0.5, 0.3, 0.6});
+    small.far = std::make_shared<const meso::Appearance>(appearanceOf(**shapeOf(relief()), 0.5, 64));
+    const std::vector<MesoSurface> surfaces{
+        mesoSurface(relief(), "pyramid", "quad", 0.3), small,
+        mesoSurface(solidAsset("weave"), "boxes", "cylinder", 0.2, 3, {0.5, 1, 0.5})};
+    Similarity second = truth.placement();
+    second.translation += glm::dvec3(-0.8, 0.3, 0.2);
+    const std::vector<PlacedDataset> one{{scene.dataset, scene.source, truth.placement()}},
+        two{one[0], {scene.dataset, scene.source, second}};
+    const auto compared = [&](const std::vector<PlacedDataset>& datasets, const auto& change, uint32_t samples = 1) {
+        ASSERT_TRUE(host_->open(datasets, surfaces));
+        ASSERT_TRUE(renderer_->open(datasets, surfaces));
+        FrameRequest request = lookFrom(views()[datasets.size() % 2]);
+        change(request);
+        expectAlike(differenceOf(request, samples), 4e-3);
+    };
+    for (const auto& datasets : {std::vector<PlacedDataset>(), one, two}) {
+        SCOPED_TRACE(datasets.size());
+        if (!datasets.empty()) compared(datasets, [](FrameRequest& request) { request.shading.shadows = true; });
+        compared(datasets, [](FrameRequest& request) { request.shading.occlusionRays = 8; });
+    }
+    compared(one, [](FrameRequest& request) {
+        request.shading.shadows = true;
+        request.shading.occlusionRays = 4;
+        request.shading.lightStrength = 0.6f;
+        request.shading.moreLights = {{false, {-0.5f, 0.4f, 0.3f}, 0.5f}};
+        request.sections = {{{0.3, 0.2, -1}, -0.6}};
+    });
+    compared(
+        one, [](FrameRequest& request) { request.shading.shadows = true; }, 4);
 }
 
 /// With rays into the sky, a scan stands in a hollow of light on the relief, and is darker next to it.

@@ -1,0 +1,15 @@
+// Surfaces in a picture in which they and datasets shade each other.
+#include "render/shared/frame_layout.h"
+
+uint scenePlane() { return view.width * view.height; }
+#include "render/shaders/scene_planes.glsl"
+
+// Bits of a light in a plane of light: the one light has all eight.
+uint lightBits(uint number) { return view.lightCount == 1u ? 255u : 1u << number; }
+
+// Makes a hit on the surface what the picture shows.
+void keepInScene(uint pixel, float depth, uint normal, bool isFar) {
+    targetDepths[pixel] = floatBitsToUint(depth);
+    sceneLight[sceneAt(kSceneNormal, pixel)] = normal;
+    sceneLight[sceneAt(kSceneLift, pixel)] = floatBitsToUint(isFar ? -view.shadowLift : view.shadowLift);
+}
