@@ -1,19 +1,19 @@
-// Casts a picture's rays through the shell of one surface (mesostructure/shell.h), and rays of light: towards the lights
-// from the hits on all surfaces, or, where surfaces and datasets shade each other, one ray from all that is seen.
-// Reads and writes the hits: depth, normal, look and light, iterations. A surface replaces what is farther. With kScene
-// the depths and planes of light of the whole picture are written, too.
+// Casts a picture's rays through the shell of one surface (mesostructure/shell.h), and rays of light: towards the
+// lights from the hits on all surfaces, or, where surfaces and datasets shade each other, one ray from all that is
+// seen. Reads and writes the hits: depth, normal, look and light, iterations. A surface replaces what is farther. With
+// kScene the depths and planes of light of the whole picture are written, too.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #include "render/shaders/meso_bindings.glsl"
 #include "render/shaders/meso_march.glsl"
 
-// What is cast. 0: the picture's rays; 1: towards the lights from hits on surfaces; 2: `ray`, towards a light; 3: `ray`,
-// into the sky.
+// What is cast. 0: the picture's rays; 1: towards the lights from hits on surfaces; 2: `ray`, towards a light; 3:
+// `ray`, into the sky.
 layout(constant_id = 4) const uint kRays = 0u;
 const uint kShadow = kRays == 1u || kRays == 2u ? 1u : 0u;
 layout(constant_id = 5) const uint kTextures = 0u;  // kMesoColours, kMesoNormals
 layout(constant_id = 6) const uint kFromFar = 0u;  // 1: slabs that are less high than a part of a pixel are not marched
-layout(constant_id = 7) const uint kScene = 0u;   // 1: surfaces and datasets shade each other
+layout(constant_id = 7) const uint kScene = 0u;    // 1: surfaces and datasets shade each other
 layout(local_size_x = 8, local_size_y = 8) in;
 
 uint fetchHit(uint i) { return hits[i]; }
@@ -65,7 +65,8 @@ void castSceneRay(uvec2 pixel, uint index, vec3 place) {
         sceneLight[sceneAt(kSceneLight, index)] = blocked ? seen & ~bits : seen;
         return;
     }
-    float near = ray.isFirst != 0u ? ray.reach : min(ray.reach, uintBitsToFloat(sceneLight[sceneAt(kSceneNear, index)]));
+    float near =
+        ray.isFirst != 0u ? ray.reach : min(ray.reach, uintBitsToFloat(sceneLight[sceneAt(kSceneNear, index)]));
     near = castLight(from, skyDirection(n, ray.number, ray.occlusionRays, pixel.x, pixel.y, ray.sampleNumber), near);
     keepSkyRay(index, near, ray.number, ray.occlusionRays, ray.isLast != 0u, ray.reach);
 }

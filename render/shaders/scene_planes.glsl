@@ -18,6 +18,5 @@ void keepSkyRay(uint pixel, float near, uint number, uint rays, bool isLast, flo
     uint at = sceneAt(kSceneLight, pixel);
     float part = near / reach;
     float open = (number == 0u ? 0.0 : uintBitsToFloat(sceneLight[at])) + (part < 1.0 ? skyBehind(part) : 1.0);
-    sceneLight[at] =
-        number + 1u < rays ? floatBitsToUint(open) : packUnorm4x8(vec4(1.0, open / float(rays), 0.0, 0.0));
+    sceneLight[at] = number + 1u < rays ? floatBitsToUint(open) : packUnorm4x8(vec4(1.0, open / float(rays), 0.0, 0.0));
 }

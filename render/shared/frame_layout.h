@@ -148,10 +148,10 @@ struct SceneRay {
 const uint kSunRay = 0xffffffffu;  // of the first light; those of the others have the numbers below
 
 // Planes of a picture of several datasets that shade each other, words: the packed normal in the world's axes
-// (hit_records.glsl), by how many world units rays of light begin above the hit (float bits; negative where a surface is
-// seen from far, which any light may reach), light (8 bits sun, 8 bits
-// sky, as shade.comp has them; before the last ray into the sky the sum of what these see, float bits), and where the
-// ray that is being cast was stopped (float bits; world units).
+// (hit_records.glsl), by how many world units rays of light begin above the hit (float bits; negative where a surface
+// is seen from far, which any light may reach), light (8 bits sun, 8 bits sky, as shade.comp has them; before the last
+// ray into the sky the sum of what these see, float bits), and where the ray that is being cast was stopped (float
+// bits; world units).
 const uint kSceneNormal = 0u;
 const uint kSceneLift = 1u;
 const uint kSceneLight = 2u;

@@ -22,7 +22,7 @@ const uint kMesoMaxLights = 4u;
 
 // A ray of light through surfaces from what a picture shows, whatever that is (FrameConstants, SceneRay).
 struct MesoLightRay {
-    uint number;           // of the rays into the sky; kSunRay, of the first light, and the numbers below it of the others
+    uint number;  // of the rays into the sky; kSunRay, of the first light, and the numbers below it of the others
     uint isFirst, isLast;  // 1: of all that the ray goes through
     uint occlusionRays, sampleNumber;
     float reach;  // of occlusion, world units
