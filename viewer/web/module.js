@@ -81,6 +81,10 @@ export class Module {
     supply(offset, bytes) {
         this.with(bytes, at => this.wasm.vcp_supply(offset, at, bytes.byteLength));
     }
+    /// Says that the file with the byte at an offset cannot be had, and why.
+    lose(offset, why) {
+        this.with(kText.encode(why + '\0'), at => this.wasm.vcp_lose(offset, at));
+    }
     /// Throws what the module says where a call failed; returns its result.
     checked(result) {
         if (result < 0) throw new Error(this.error());

@@ -1,7 +1,7 @@
 // The first worker of a viewer: fetches, decodes, chooses pages and draws, with others where there are any (share.js), so
 // that the page never waits.
 import { Module } from './module.js';
-import { Files, joined, overlap, urgentFirst, without } from './ranges.js';
+import { Files, ServerError, joined, overlap, urgentFirst, without } from './ranges.js';
 import { Caster, costsOf, partsOf } from './share.js';
 
 const kLead = 64 << 10;      // bytes of the first request: header, directory and the coarsest pages
@@ -64,7 +64,11 @@ function fetchPart(part) {
             module.supply(part.offset, bytes);
             fetched = joined([...fetched, part], 0, Infinity);
         })
-        .catch(error => { failed = error; })
+        .catch(error => {
+            // Without one of several files the others are shown.
+            if (error instanceof ServerError && module.placeOf(part.offset).name !== '') module.lose(part.offset, error.message);
+            else failed = error;
+        })
         .finally(() => {
             asked.delete(part);
             wake();

@@ -182,6 +182,46 @@ await check('a scan in shards is drawn as the file is, from the shards that it n
     console.log(`   settled twice: ${shards.requests} requests, ${whole.requests} of the file; ${asked.size - 1} shards`);
 });
 
+await check('of a shard that is not there one line tells, and the others are shown', async () => {
+    const names = fs.readdirSync('shards').filter(name => name.endsWith('.vcp')), problems = new Map();
+    let unharmed = 0, drawn = 0;
+    for (const gone of names) {
+        let asked = 0;
+        const inFolder = async (url, request) => {
+            const name = url.split('/').pop();
+            if (name !== gone) return server(fs.readFileSync(`shards/${name}`))(url, request);
+            ++asked;
+            return new Response('', { status: 404 });
+        };
+        const shards = new Files('folder/manifest.vcps', inFolder);
+        let module = null;
+        try {
+            module = await opened(shards);
+        } catch (error) {
+            assert.match(error.message, /the server has no such file/); // it has the directory
+            continue;
+        }
+        const orbit = new Orbit(), info = module.info();
+        orbit.fit(info.boundsMin, info.boundsMax, 1.6);
+        look(module, orbit);
+        let update = null;
+        for (let round = 0; round < 1000 && !update?.settled; ++round) {
+            update = module.update();
+            if (update.problem) problems.set(gone, update.problem);
+            if (update.drawable && update.awaitsRays) cast(module);
+            await supply(module, shards);
+        }
+        assert.ok(update.settled, `${gone}: it settles`);
+        assert.ok(asked <= 8, `${gone} was asked for ${asked} times`);
+        if (update.drawable) assert.ok(hitsOf(cast(module)) > 1000);
+        drawn += update.drawable ? 1 : 0;
+        if (asked > 0) assert.match(problems.get(gone) ?? '', new RegExp(`${gone}: the server has no such file`));
+        else ++unharmed;
+    }
+    console.log(`   ${problems.size} of ${names.length} shards were missed, ${unharmed} not needed; ${drawn} pictures`);
+    assert.ok(problems.size > 1 && drawn >= names.length - 2, 'one shard has the directory, and one the coarsest page');
+});
+
 await check('what rays hit counts the same, whoever cast them', async () => {
     const ranges = [0, 1].map(() => new Ranges('scan.vcp', server(file)));
     const [alone, first] = await Promise.all(ranges.map(each => opened(each))), other = await CasterHere.beside(first, 64 << 20);

@@ -7,7 +7,7 @@ import { pathToFileURL } from 'node:url';
 const web = process.argv[2];
 const file = name => import(pathToFileURL(path.join(web, name)));
 export const { Module } = await file('module.js');
-export const { Files, Ranges, joined, parseContentRange, urgentFirst, without } = await file('ranges.js');
+export const { Files, Ranges, ServerError, joined, parseContentRange, urgentFirst, without } = await file('ranges.js');
 export const { Caster, costsOf, partsOf } = await file('share.js');
 export const { Orbit, kFieldOfView, movingScale } = await file('camera.js');
 export const wasm = fs.readFileSync(path.join(web, 'vcp.wasm'));
@@ -33,7 +33,13 @@ export const quick = ranges => Object.assign(ranges, { delay: 1 });
 
 export async function supply(module, ranges) {
     for (const { offset, bytes } of joined(module.missing(), 32 << 10, 256 << 10))
-        module.supply(offset, await ranges.read(offset, bytes));
+        try {
+            module.supply(offset, await ranges.read(offset, bytes));
+        } catch (error) {
+            // As the worker does.
+            if (!(error instanceof ServerError && module.placeOf(offset).name !== '')) throw error;
+            module.lose(offset, error.message);
+        }
 }
 
 export async function opened(ranges, budget = 64 << 20) {

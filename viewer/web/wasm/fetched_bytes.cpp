@@ -51,6 +51,8 @@ Result<void> FetchedFile::read(uint64_t offset, std::span<std::byte> bytes) cons
     if (offset > size_ || bytes.size() > size_ - offset)
         return Error{
             .code = ErrorCode::Io, .message = "the file ends here; it was truncated", .file = name_, .byte = offset};
+    if (const std::string* const why = bytes_->whyLost(begin_ + offset))
+        return Error{.code = ErrorCode::Io, .message = *why};
     if (bytes_->read(begin_ + offset, bytes)) return {};
     return Error::cancelled(name_);
 }

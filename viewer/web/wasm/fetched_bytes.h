@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <list>
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -33,6 +34,13 @@ public:
     bool read(uint64_t offset, std::span<std::byte> bytes);
     /// Forgets the bytes, so that they are fetched anew.
     void forget(uint64_t offset, uint64_t bytes);
+    /// Notes that the file with this byte cannot be had, for this reason: what is missing of it is asked for no more.
+    void lose(uint64_t offset, std::string why) { lost_.insert_or_assign(offset / kFileSpan, std::move(why)); }
+    /// Returns the reason, or null.
+    [[nodiscard]] const std::string* whyLost(uint64_t offset) const {
+        const auto found = lost_.find(offset / kFileSpan);
+        return found != lost_.end() ? &found->second : nullptr;
+    }
 
 private:
     struct Piece {
@@ -42,9 +50,11 @@ private:
     uint64_t mostBytes_;
     std::list<Piece> pieces_;  // the oldest first
     std::vector<Stretch> missing_;
+    std::map<uint64_t, std::string> lost_;  // by the file's number
 };
 
-/// Reads a file of those that are fetched. Where bytes have not come, reads are Cancelled.
+/// Reads a file of those that are fetched. Where bytes have not come, reads are Cancelled; of a file that cannot be had,
+/// Io.
 class FetchedFile final : public ByteReader {
 public:
     FetchedFile(std::shared_ptr<FetchedBytes> bytes, uint64_t number, uint64_t size, std::string name)

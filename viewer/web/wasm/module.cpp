@@ -201,6 +201,9 @@ EXPORT(vcp_supply) void vcp_supply(double offset, const std::byte* bytes, size_t
     opened.fetched->supply(uint64_t(offset), {bytes, bytes + count});
 }
 
+/// Says that the file with the byte at an offset cannot be had. `why`: a line for people.
+EXPORT(vcp_lose) void vcp_lose(double offset, const char* why) { opened.fetched->lose(uint64_t(offset), why); }
+
 /// Returns kMissing until header and directory have come.
 EXPORT(vcp_open) int vcp_open() {
     const auto done = openDataset();
