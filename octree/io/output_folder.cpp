@@ -44,10 +44,39 @@ Result<void> checkReplaceable(const fs::path& folder, const FolderRules& rules) 
     return {};
 }
 
+/// Gives a folder a name, and the folder that has it, if any, the first one's. Returns errno, or 0; then `replaced` says
+/// whether there was one.
+int exchangeNames(const fs::path& made, const fs::path& name, bool& replaced) {
+    const auto rename = [&](unsigned flags) {
+        return ::renameat2(AT_FDCWD, made.c_str(), AT_FDCWD, name.c_str(), flags) == 0 ? 0 : errno;
+    };
+    replaced = false;
+    int failed = rename(RENAME_NOREPLACE);
+    if (failed == 0) return 0;
+    if (failed != EINVAL && failed != ENOSYS) {
+        replaced = true;
+        return rename(RENAME_EXCHANGE);
+    }
+    // Such as NFS, which has neither: a folder takes the name of an empty one or of none, else that one steps aside.
+    if (::rename(made.c_str(), name.c_str()) == 0) return 0;
+    if (errno != ENOTEMPTY && errno != EEXIST) return errno;
+    replaced = true;
+    const fs::path aside = fs::path(made) += "-replaced";
+    if (::rename(name.c_str(), aside.c_str()) != 0) return errno;
+    failed = ::rename(made.c_str(), name.c_str()) == 0 ? 0 : errno;
+    static_cast<void>(::rename(aside.c_str(), failed == 0 ? made.c_str() : name.c_str()));
+    return failed;
+}
+
 }  // namespace
 
 Result<OutputFolder> OutputFolder::create(const fs::path& named, const FolderRules& rules) {
     OutputFolder made(named.has_filename() ? named : named.parent_path(), rules);
+    const fs::path last = made.folder_.filename();
+    if (last.empty() || last == "." || last == "..")
+        return Error{.code = ErrorCode::Usage,
+                     .message = "has no name of its own, under which a folder could be made; name one in it",
+                     .file = named.string()};
     VCP_TRY(checkReplaceable(made.folder_, rules));
     const fs::path unfinished = fs::path(made.folder_) += fmt::format(".unfinished-{}", ::getpid());
     std::error_code failed;
@@ -70,11 +99,10 @@ OutputFolder::OutputFolder(OutputFolder&& other) noexcept
 Result<void> OutputFolder::commit() {
     VCP_TRY(checkReplaceable(folder_, rules_));
     VCP_TRY(syncFolder(unfinished_));
-    const char *made = unfinished_.c_str(), *name = folder_.c_str();
-    if (::renameat2(AT_FDCWD, made, AT_FDCWD, name, RENAME_NOREPLACE) == 0)
-        unfinished_.clear();
-    else if (::renameat2(AT_FDCWD, made, AT_FDCWD, name, RENAME_EXCHANGE) != 0)
-        return systemError(folder_, "cannot be replaced", errno);
+    bool replaced = false;
+    if (const int failed = exchangeNames(unfinished_, folder_, replaced); failed != 0)
+        return systemError(folder_, replaced ? "cannot be replaced" : "cannot be named", failed);
+    if (!replaced) unfinished_.clear();
     return syncFolder(folder_.parent_path());
 }
 

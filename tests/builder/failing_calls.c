@@ -4,6 +4,7 @@
  * standard streams. FAIL_AT: the number of the call, from 1. FAIL_ERRNO: what it fails with. FAIL_ON: if set,
  * all calls after it fail, too, as on a full disk. FAIL_MARK: a file that is made when a call has failed.
  * FAIL_SHORT: instead, every write is interrupted once, and then takes only a part of its bytes.
+ * FAIL_FLAGS: renames with flags fail, as on NFS.
  */
 #define _GNU_SOURCE
 #include <dlfcn.h>
@@ -11,6 +12,7 @@
 #include <fcntl.h>
 #include <stdarg.h>
 #include <stdatomic.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <sys/stat.h>
 #include <sys/syscall.h>
@@ -66,6 +68,11 @@ ssize_t pwrite64(int fd, const void* bytes, size_t count, off64_t offset) {
 int fsync(int fd) { return fails() ? -1 : REAL(fsync)(fd); }
 int fdatasync(int fd) { return fails() ? -1 : REAL(fdatasync)(fd); }
 int rename(const char* from, const char* to) { return fails() ? -1 : REAL(rename)(from, to); }
+int renameat2(int folder, const char* from, int other, const char* to, unsigned flags) {
+    if (flags == 0 || !getenv("FAIL_FLAGS")) return REAL(renameat2)(folder, from, other, to, flags);
+    errno = EINVAL;
+    return -1;
+}
 int ftruncate(int fd, off_t size) { return fails() ? -1 : REAL(ftruncate)(fd, size); }
 int ftruncate64(int fd, off64_t size) { return fails() ? -1 : REAL(ftruncate64)(fd, size); }
 int mkdir(const char* path, mode_t mode) { return fails() ? -1 : REAL(mkdir)(path, mode); }

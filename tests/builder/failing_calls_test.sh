@@ -30,6 +30,25 @@ LD_PRELOAD=$library FAIL_SHORT=1 "${build[@]}" >/dev/null
 cmp whole.vcp out.vcp || fail "short writes give other bytes"
 rm out.vcp
 
+# Where folders cannot be exchanged, such as on NFS, the old one steps aside.
+for flags in "" 1; do
+    folder=("$vcp" build ring.obj --cell 0.1 --memory 200M --threads 2 --temp temp --progress none --shards 64K -o)
+    for turn in made replaced; do
+        LD_PRELOAD=$library ${flags:+env FAIL_FLAGS=1} "${folder[@]}" "folder$flags" >/dev/null || fail "no folder $turn"
+    done
+    mkdir "other$flags"
+    echo mine >"other$flags/notes"
+    if LD_PRELOAD=$library ${flags:+env FAIL_FLAGS=1} "${folder[@]}" "other$flags" >/dev/null 2>err.txt; then fail "other$flags was replaced"; fi
+    grep -q "holds notes" err.txt || fail "$(cat err.txt)"
+    [ "$(cat "other$flags/notes")" = mine ]
+done
+diff -r folder folder1
+[ -z "$(ls -d folder*unfinished* 2>/dev/null)" ] || fail "left: $(ls -d folder*)"
+for named in . .. folder/.; do
+    if "$vcp" build ring.obj --cell 0.1 --shards 64K --progress none --overwrite -o $named >/dev/null 2>err.txt; then fail "-o $named"; fi
+    grep -q "has no name of its own" err.txt || fail "-o $named: $(cat err.txt)"
+done
+
 # sweep FIRST STEP ERRNO [ON]: fails one call, then the one STEP later, ...; with ON all calls after it, too. In a folder
 # of its own.
 sweep() {

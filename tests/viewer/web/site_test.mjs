@@ -41,6 +41,12 @@ assert.equal(bodyOf(await get('/scan.vcp')), latin);
 assert.match(await get('/'), /^HTTP\/1\.1 200 OK\r\nContent-Type: text\/html/);
 assert.match(await get('/vcp-viewer.js?v=1'), /Content-Type: text\/javascript/);
 assert.match(await get('/vcp.wasm'), /Content-Type: application\/wasm/);
+// A shard's name says what is in it: browsers keep it for ever.
+const shard = `${'0123456789abcdef'.repeat(2)}.vcp`;
+fs.writeFileSync(path.join(folder, shard), 'x');
+assert.match(await get(`/${shard}`), /\r\nCache-Control: max-age=31536000, immutable\r\n/);
+assert.match(await get('/scan.vcp'), /\r\nCache-Control: no-cache\r\n/);
+fs.rmSync(path.join(folder, shard));
 assert.equal(bodyOf(await raw('HEAD /scan.vcp HTTP/1.1\r\nConnection: close\r\n\r\n')), '');
 
 // Ranges, against slices of the file.

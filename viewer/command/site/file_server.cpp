@@ -20,6 +20,7 @@
 
 #include "octree/io/durable_file.h"
 #include "octree/io/file_descriptor.h"
+#include "streaming/shard/shard_manifest.h"
 #include "viewer/command/site/http_request.h"
 
 namespace vcp {
@@ -150,7 +151,9 @@ private:
             head += fmt::format("Content-Range: bytes {}-{}/{}\r\n", range.bytes.first,
                                 range.bytes.first + range.bytes.count - 1, size);
         head += fmt::format("ETag: \"{:x}-{:x}-{:x}\"\r\n", size, info.st_mtim.tv_sec, info.st_mtim.tv_nsec);
-        head += "Accept-Ranges: bytes\r\nCache-Control: no-cache\r\nX-Content-Type-Options: nosniff\r\n";
+        // A shard's name says what is in it.
+        const char* const kept = isShardName(path->filename().string()) ? "max-age=31536000, immutable" : "no-cache";
+        head += fmt::format("Accept-Ranges: bytes\r\nCache-Control: {}\r\nX-Content-Type-Options: nosniff\r\n", kept);
         if (request.closes) head += "Connection: close\r\n";
         return send(head + "\r\n") && (request.isHead || sendBody(file.number(), range.bytes));
     }
