@@ -44,8 +44,8 @@ Result<void> checkReplaceable(const fs::path& folder, const FolderRules& rules) 
     return {};
 }
 
-/// Gives a folder a name, and the folder that has it, if any, the first one's. Returns errno, or 0; then `replaced` says
-/// whether there was one.
+/// Gives a folder a name, and the folder that has it, if any, the first one's. Returns errno, or 0; then `replaced`
+/// says whether there was one.
 int exchangeNames(const fs::path& made, const fs::path& name, bool& replaced) {
     const auto rename = [&](unsigned flags) {
         return ::renameat2(AT_FDCWD, made.c_str(), AT_FDCWD, name.c_str(), flags) == 0 ? 0 : errno;

@@ -354,7 +354,8 @@ Result<std::shared_ptr<const ByteReader>> openDatasetFile(const std::filesystem:
     VCP_TRY_ASSIGN(auto reader,
                    ShardedReader::open(file,
                                        [folder = named.parent_path()](
-                                           const ShardRow& row, bool) -> Result<std::shared_ptr<const ByteReader>> {
+                                           const ShardRow& row, bool,
+                                           const std::function<bool()>&) -> Result<std::shared_ptr<const ByteReader>> {
                                            VCP_TRY_ASSIGN(auto shard, openFile(folder / shardName(row)));
                                            return std::shared_ptr<const ByteReader>(shard);
                                        }));

@@ -15,8 +15,9 @@ namespace vcp {
 /// A shard that was asked for.
 struct ShardedReader::Shard {
     std::mutex opening;
-    std::shared_ptr<const ByteReader> file;  ///< null until it is open; guarded by the reader's mutex
-    uint64_t lastUse = 0;                    ///< guarded by the reader's mutex
+    std::shared_ptr<const ByteReader> file;   ///< null until it is open; guarded by the reader's mutex
+    uint64_t lastUse = 0;                     ///< guarded by the reader's mutex
+    std::shared_ptr<std::atomic<bool>> stop;  ///< ends its opening; null while that is not under way; guarded likewise
 };
 
 /// Pages of a run whose entries are asked for.
@@ -93,14 +94,18 @@ std::shared_ptr<ShardedReader::Shard> ShardedReader::slotOf(uint64_t number) con
 
 Result<std::shared_ptr<const ByteReader>> ShardedReader::shardFile(uint64_t number) const {
     const auto slot = slotOf(number);
+    const uint64_t interrupts = interrupts_;
     // Whoever comes while it is being opened waits; other shards do not.
     const std::lock_guard opening(slot->opening);
+    const auto stop = std::make_shared<std::atomic<bool>>(false);
     {
         const std::lock_guard lock(mutex_);
         if (slot->file) return slot->file;
+        if (interrupts_ != interrupts) return Error::cancelled(name());
+        slot->stop = stop;
     }
     VCP_TRY_ASSIGN(const auto row, manifest_->shard(number));
-    VCP_TRY_ASSIGN(auto file, openShard_(row, number == 0));
+    VCP_TRY_ASSIGN(auto file, openShard_(row, number == 0, [stop] { return stop->load(); }));
     if (file->size() != row.bytes)
         return Error{.code = ErrorCode::InvalidInput,
                      .message = fmt::format("has {} bytes, and {} says {}: it is another file, or was truncated",
@@ -108,14 +113,20 @@ Result<std::shared_ptr<const ByteReader>> ShardedReader::shardFile(uint64_t numb
                      .file = file->name()};
     const std::lock_guard lock(mutex_);
     slot->file = file;
+    slot->stop.reset();
+    *stop = false;  // later reads of the file work
+    if (interrupts_ != interrupts) return Error::cancelled(name());
     return file;
 }
 
 void ShardedReader::interrupt() const {
     manifest_->reader().interrupt();
     const std::lock_guard lock(mutex_);
-    for (const auto& [number, slot] : open_)
+    ++interrupts_;
+    for (const auto& [number, slot] : open_) {
         if (slot->file) slot->file->interrupt();
+        if (slot->stop) *slot->stop = true;
+    }
 }
 
 Result<void> ShardedReader::read(uint64_t offset, std::span<std::byte> bytes) const {

@@ -2,6 +2,7 @@
 // for.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -17,8 +18,9 @@
 namespace vcp {
 
 /// Opens the file of a shard, whose name is shardName(shard). `isFirst`: whether it is shard 0, which a first picture
-/// needs.
-using OpenShard = std::function<Result<std::shared_ptr<const ByteReader>>(const ShardRow& shard, bool isFirst)>;
+/// needs. Once `cancelled` returns true, opening ends soon with Cancelled; of an open file's reads it says nothing.
+using OpenShard = std::function<Result<std::shared_ptr<const ByteReader>>(const ShardRow& shard, bool isFirst,
+                                                                          const std::function<bool()>& cancelled)>;
 
 /// Shards are opened when they are first read from, and the ones used last stay open: at most kMostOpen of them. Memory
 /// and the reads of a first picture do not depend on how many there are. Entries of the directory are checked by the
@@ -60,6 +62,7 @@ private:
     mutable std::mutex mutex_;
     mutable std::unordered_map<uint64_t, std::shared_ptr<Shard>> open_;  // by number
     mutable uint64_t uses_ = 0;
+    mutable std::atomic<uint64_t> interrupts_ = 0;
 };
 
 }  // namespace vcp

@@ -232,6 +232,49 @@ TEST_F(Shards, DamageIsNamed) {
     EXPECT_TRUE(has(said(), "manifest.vcps") && has(said(), "shorter or longer")) << said();
 }
 
+// As on a server that does not answer: opening lasts until it is cancelled, and whoever waits for it is told, too.
+TEST_F(Shards, OpeningIsInterruptedAndLaterReadsWork) {
+    const Bytes file = fileOf(3, 4, 0.4);
+    split(file, file.size() / 5);
+    std::atomic<int> opening = 0;
+    std::atomic<bool> isStalled = true;
+    const auto openShard = [&](const ShardRow& row, bool,
+                               const std::function<bool()>& cancelled) -> Result<std::shared_ptr<const ByteReader>> {
+        ++opening;
+        while (isStalled && !cancelled()) std::this_thread::yield();
+        if (cancelled()) return Error::cancelled(shardName(row));
+        VCP_TRY_ASSIGN(auto shard, openFile(folder_ / "shards" / shardName(row)));
+        return std::shared_ptr<const ByteReader>(shard);
+    };
+    const auto reader = ShardedReader::open(*openFile(folder_ / "shards/manifest.vcps"), openShard);
+    ASSERT_TRUE(reader.ok()) << reader.error().line();
+    std::vector<Result<void>> ends(4, Result<void>());
+    std::vector<std::thread> threads;
+    for (Result<void>& end : ends)
+        threads.emplace_back([&] {
+            Bytes whole(file.size());
+            end = (*reader)->read(0, whole);
+        });
+    while (opening == 0) std::this_thread::yield();
+    // A read that has not come so far is not under way; it is interrupted in its turn.
+    std::atomic<bool> done = false;
+    std::thread interrupting([&] {
+        while (!done) {
+            (*reader)->interrupt();
+            std::this_thread::yield();
+        }
+    });
+    for (std::thread& thread : threads) thread.join();
+    done = true;
+    interrupting.join();
+    for (const Result<void>& end : ends) {
+        ASSERT_FALSE(end.ok());
+        EXPECT_EQ(end.error().code, ErrorCode::Cancelled);
+    }
+    isStalled = false;
+    EXPECT_TRUE(allOf(**reader) == file);
+}
+
 TEST_F(Shards, EveryBitOfAManifestCounts) {
     const Bytes file = fileOf(2, 4, 0.4);
     split(file, file.size() / 5);
@@ -240,11 +283,12 @@ TEST_F(Shards, EveryBitOfAManifestCounts) {
     for (size_t bit = 0; bit < 8 * intact.size(); bit += 7) {
         Bytes bytes = intact;
         bytes[bit / 8] ^= std::byte{1} << int(bit % 8);
-        auto reader = ShardedReader::open(std::make_shared<test::CountedFile>(bytes),
-                                          [&](const ShardRow& row, bool) -> Result<std::shared_ptr<const ByteReader>> {
-                                              VCP_TRY_ASSIGN(auto shard, openFile(folder_ / "shards" / shardName(row)));
-                                              return std::shared_ptr<const ByteReader>(shard);
-                                          });
+        auto reader = ShardedReader::open(
+            std::make_shared<test::CountedFile>(bytes),
+            [&](const ShardRow& row, bool, const std::function<bool()>&) -> Result<std::shared_ptr<const ByteReader>> {
+                VCP_TRY_ASSIGN(auto shard, openFile(folder_ / "shards" / shardName(row)));
+                return std::shared_ptr<const ByteReader>(shard);
+            });
         if (!reader) continue;
         Bytes whole((*reader)->size());
         EXPECT_FALSE((*reader)->read(0, whole).ok()) << "bit " << bit;
@@ -288,11 +332,12 @@ TEST_F(Shards, HostileRowsReadNothingThatIsNotThere) {
                 hostile(&manyRuns[random() % manyRuns.size()]);
         const Bytes bytes = storedManifest(header, std::span(intact).subspan(kDirectoryOffset, kDirectoryOffset),
                                            manyShards, manyRuns, kept);
-        auto reader = ShardedReader::open(std::make_shared<test::CountedFile>(bytes),
-                                          [&](const ShardRow& row, bool) -> Result<std::shared_ptr<const ByteReader>> {
-                                              VCP_TRY_ASSIGN(auto shard, openFile(folder_ / "shards" / shardName(row)));
-                                              return std::shared_ptr<const ByteReader>(shard);
-                                          });
+        auto reader = ShardedReader::open(
+            std::make_shared<test::CountedFile>(bytes),
+            [&](const ShardRow& row, bool, const std::function<bool()>&) -> Result<std::shared_ptr<const ByteReader>> {
+                VCP_TRY_ASSIGN(auto shard, openFile(folder_ / "shards" / shardName(row)));
+                return std::shared_ptr<const ByteReader>(shard);
+            });
         if (!reader) continue;
         ++opened;
         if (const auto dataset = readDataset(**reader)) {
@@ -370,7 +415,7 @@ public:
         // What is kept is what a reader puts together without it.
         const auto plain =
             *ShardedReader::open(std::make_shared<test::CountedFile>(storedManifest(manifest, first, shards, runs, {})),
-                                 [&](const ShardRow& row, bool) { return open(row); });
+                                 [&](const ShardRow& row, bool, const std::function<bool()>&) { return open(row); });
         std::vector<KeptBlock> kept;
         for (const uint64_t block : blocksToKeep(runs, pages_)) {
             kept.push_back({block, Bytes(kBlockBytes)});
@@ -470,7 +515,7 @@ FirstPicture firstPictureOf(uint32_t levels) {
     EndlessShards endless(levels, 4);
     const auto manifest = std::make_shared<test::CountedFile>(endless.manifest());
     uint64_t shardsOpened = 0;
-    const auto reader = *ShardedReader::open(manifest, [&](const ShardRow& row, bool) {
+    const auto reader = *ShardedReader::open(manifest, [&](const ShardRow& row, bool, const std::function<bool()>&) {
         ++shardsOpened;
         return endless.open(row);
     });

@@ -43,9 +43,11 @@ Result<std::shared_ptr<const ByteReader>> openReader(const std::string& where, c
     VCP_TRY_ASSIGN(const auto file, openRemote(where, access, options));
     VCP_TRY_ASSIGN(const bool inShards, isManifest(*file));
     if (!inShards) return file;
-    const auto openShard = [where, access, options, usual](const ShardRow& shard, bool isFirst) {
+    const auto openShard = [where, access, options, usual](const ShardRow& shard, bool isFirst,
+                                                           const std::function<bool()>& cancelled) {
         HttpOptions ofShard = options;
         ofShard.firstBytes = isFirst ? usual : kFirstOfShard;
+        ofShard.cancelled = [all = options.cancelled, cancelled] { return cancelled() || (all && all()); };
         return openRemote(addressBeside(where, shardName(shard)), access, ofShard);
     };
     VCP_TRY_ASSIGN(auto reader, ShardedReader::open(file, openShard));

@@ -67,8 +67,9 @@ Result<std::shared_ptr<FetchedDataset>> FetchedDataset::open(const std::shared_p
         return opened;
     }
     opened->isSharded_ = true;
-    const auto openShard = [bytes, files = opened->files_](const ShardRow& shard,
-                                                           bool) -> Result<std::shared_ptr<const ByteReader>> {
+    const auto openShard = [bytes, files = opened->files_](
+                               const ShardRow& shard, bool,
+                               const std::function<bool()>&) -> Result<std::shared_ptr<const ByteReader>> {
         // A shard that was let go keeps its number.
         const std::string named = shardName(shard);
         const auto known = std::find(files->begin(), files->end(), named);

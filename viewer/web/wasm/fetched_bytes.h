@@ -53,8 +53,8 @@ private:
     std::map<uint64_t, std::string> lost_;  // by the file's number
 };
 
-/// Reads a file of those that are fetched. Where bytes have not come, reads are Cancelled; of a file that cannot be had,
-/// Io.
+/// Reads a file of those that are fetched. Where bytes have not come, reads are Cancelled; of a file that cannot be
+/// had, Io.
 class FetchedFile final : public ByteReader {
 public:
     FetchedFile(std::shared_ptr<FetchedBytes> bytes, uint64_t number, uint64_t size, std::string name)
