@@ -273,7 +273,8 @@ Command addRender(CLI::App& vcp) {
     CLI::App* app =
         vcp.add_subcommand("render", "Render .vcp files, a scene or meshes into a picture, without a window");
     app->add_option("IN", command->inputs,
-                    ".vcp files or their http(s) addresses, a scene file (.json), or meshes, which are built into the "
+                    ".vcp files or folders of shards, their http(s) addresses, a scene file (.json), or meshes, which "
+                    "are built into the "
                     "cache first")
         ->type_name("")
         ->required();

@@ -123,7 +123,8 @@ Command addView(CLI::App& vcp) {
     auto command = std::make_shared<ViewCommand>();
     CLI::App* app = vcp.add_subcommand("view", "Open a window, on .vcp files, a scene or meshes");
     app->add_option("IN", command->inputs,
-                    ".vcp files or their http(s) addresses, a scene file (.json), or meshes, which are built into the "
+                    ".vcp files or folders of shards, their http(s) addresses, a scene file (.json), or meshes, which "
+                    "are built into the "
                     "cache first")
         ->type_name("");
     beginGroup(*app, help_group::kCamera);

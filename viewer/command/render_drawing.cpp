@@ -134,11 +134,12 @@ std::string summary(const RenderCommand& command, const Drawing& drawing, const 
     const std::string samples = drawing.samples > 1 ? fmt::format(", {} samples in {}", drawing.samples,
                                                                   formatSeconds(1e-3 * drawing.samplesMs))
                                                     : "";
-    return fmt::format("{}: {}, {} in {:.1f} ms ({:.1f} M rays/s){} on {}{}\n  {} parts, {} of memory, {}, {}",
+    return fmt::format("{}: {}, {} in {:.1f} ms ({:.1f} M rays/s){} on {}{}\n  {} part{}, {} of memory, {}, {}",
                        command.output, sizeText(command.size), drawing.frameMs.empty() ? "first frame" : "a frame",
                        drawing.medianMs(), 1e-6 * drawing.raysPerSecond(), samples,
                        castBy(device, drawing.stats.onHost), device.software ? " (software)" : "", update.pagesInCut,
-                       formatBytes(update.residentBytes), error, textOf(detailOf(update, askedPixels)));
+                       update.pagesInCut == 1 ? "" : "s", formatBytes(update.residentBytes), error,
+                       textOf(detailOf(update, askedPixels)));
 }
 
 /// Prints a line about the picture, or returns its figures, for --json.

@@ -4,6 +4,8 @@
 #include <cctype>
 #include <system_error>
 
+#include "streaming/shard/shard_manifest.h"
+
 namespace vcp {
 
 namespace fs = std::filesystem;
@@ -32,6 +34,12 @@ bool looksOpenable(const std::string& name) {
                        [&](const char* extension) { return plain.ends_with(extension); });
 }
 
+std::string shownName(const std::string& opened) {
+    fs::path path(opened);
+    if (!path.has_filename() || path.filename() == kManifestName) path = path.parent_path();
+    return path.has_filename() ? path.filename().string() : opened;
+}
+
 void FileList::read(const fs::path& folder) {
     std::error_code failed;
     folder_ = fs::absolute(folder, failed).lexically_normal();
@@ -41,9 +49,13 @@ void FileList::read(const fs::path& folder) {
     for (; !failed && at != fs::directory_iterator() && entries_.size() < kMostEntries; at.increment(failed)) {
         Entry entry{at->path().filename().string()};
         std::error_code unknown;
-        entry.isFolder = at->is_directory(unknown);
-        if (entry.name.starts_with('.') || (!entry.isFolder && !looksOpenable(entry.name))) continue;
-        if (!entry.isFolder) entry.bytes = at->file_size(unknown);
+        const bool isInShards = fs::is_regular_file(at->path() / kManifestName, unknown);
+        entry.isFolder = !isInShards && at->is_directory(unknown);
+        if (entry.name.starts_with('.')) continue;
+        if (!entry.isFolder && !isInShards) {
+            if (!looksOpenable(entry.name)) continue;
+            entry.bytes = at->file_size(unknown);
+        }
         if (!unknown) entries_.push_back(std::move(entry));
     }
     if (failed) problem_ = failed.message();

@@ -14,8 +14,8 @@ public:
 
     struct Entry {
         std::string name;
-        bool isFolder = false;
-        uint64_t bytes = 0;
+        bool isFolder = false;  ///< one that is looked into; a dataset in shards is opened as a file is
+        uint64_t bytes = 0;     ///< 0 of a dataset in shards
     };
 
     /// Lists a folder: folders first, each by name, capitals or not; without hidden ones, and at most kMostEntries.
@@ -35,6 +35,9 @@ private:
 
 /// Whether a file's name is one of a dataset, a scene or a mesh.
 bool looksOpenable(const std::string& name);
+
+/// Returns how a path or an address that was opened is called: its last part; of a manifest, its folder.
+std::string shownName(const std::string& opened);
 
 /// Whether a text holds another, capitals or not (ASCII).
 bool holds(const std::string& text, const std::string& part);

@@ -138,7 +138,7 @@ void Interface::layOutFolder() {
         text(look_->body, entry.isFolder ? look_->palette.dim : look_->palette.accent,
              entry.isFolder ? icon::kFolder : icon::kFile);
         ImGui::SameLine(left + units(32));
-        const std::string bytes = entry.isFolder ? "" : typeset(formatBytes(entry.bytes));
+        const std::string bytes = entry.bytes == 0 ? "" : typeset(formatBytes(entry.bytes));
         const float wide = ImGui::CalcTextSize(bytes.c_str()).x;
         text(fitted(entry.name, right - left - units(48) - wide));
         ImGui::SameLine(right - wide - units(4));
@@ -276,7 +276,7 @@ void Interface::layOutRecent(float width, size_t columns) {
             list.AddText({0.5f * (from.x + to.x - size.x), 0.5f * (from.y + to.y - size.y)}, palette.dim, icon::kFile);
         }
         if (isHovered) list.AddRect(from, to, palette.accent, units(6), 0, units(2));
-        const std::string name = fitted(fs::path(recent[i]).filename().string(), width);
+        const std::string name = fitted(shownName(recent[i]), width);
         list.AddText({from.x, to.y + units(4)}, isHovered ? palette.accent : palette.ink, name.c_str());
         ImGui::EndGroup();
         ImGui::PopID();

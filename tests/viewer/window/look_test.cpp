@@ -187,17 +187,31 @@ TEST(FileListTest, FoldersFirstThenWhatCanBeOpened) {
     fs::create_directory(folder / ".hidden");
     for (const char* name : {"b.vcp", "A.PLY", "notes.txt", ".secret.ply", "c.obj.gz", "scene.json"})
         std::ofstream(folder / name) << "12345";
+    fs::create_directory(folder / "scan");
+    std::ofstream(folder / "scan/manifest.vcps") << "12345";
     FileList list;
     list.read(folder / ".");
     std::vector<std::string> names;
     for (const FileList::Entry& entry : list.holding("")) names.push_back(entry.name);
-    EXPECT_EQ(names, (std::vector<std::string>{"Zebra", "A.PLY", "b.vcp", "c.obj.gz", "scene.json"}));
+    EXPECT_EQ(names, (std::vector<std::string>{"Zebra", "A.PLY", "b.vcp", "c.obj.gz", "scan", "scene.json"}));
+    EXPECT_FALSE(list.holding("scan").front().isFolder) << "it is opened, not looked into";
     EXPECT_EQ(list.problem(), "");
     ASSERT_EQ(list.holding("a.p").size(), 1u);
     EXPECT_EQ(list.holding("a.p").front().bytes, 5u);
     list.read(folder / "gone");
     EXPECT_NE(list.problem(), "");
     EXPECT_TRUE(list.holding("").empty());
+}
+
+TEST(FileListTest, WhatWasOpenedHasAName) {
+    for (const auto& [opened, name] : {std::pair("/scans/a.vcp", "a.vcp"),
+                                       {"/scans/b/", "b"},
+                                       {"/scans/b", "b"},
+                                       {"/scans/b/manifest.vcps", "b"},
+                                       {"https://here/c.vcp", "c.vcp"},
+                                       {"https://here/d/manifest.vcps", "d"},
+                                       {"/", "/"}})
+        EXPECT_EQ(shownName(opened), name);
 }
 
 TEST(ThumbnailTest, IsTheMiddleOfWhatPanelsLeave) {
