@@ -203,7 +203,9 @@ Command addExport(CLI::App& vcp) {
     auto command = std::make_shared<ExportCommand>();
     CLI::App* app =
         vcp.add_subcommand("export", "Write the surface of a .vcp file as a mesh, or a section as a drawing");
-    app->add_option("FILE", command->file, "A .vcp file, a folder of shards, or the http(s) address of either")->type_name("")->required();
+    app->add_option("FILE", command->file, "A .vcp file, a folder of shards, or the http(s) address of either")
+        ->type_name("")
+        ->required();
     beginGroup(*app, help_group::kOutput);
     app->add_option("-o,--output", command->output,
                     "The file to write, its format by its name: .ply, .obj, .stl or .glb, or with --section .svg or "

@@ -188,7 +188,9 @@ Result<int> run(const InfoCommand& command) {
 Command addInfo(CLI::App& vcp) {
     auto command = std::make_shared<InfoCommand>();
     CLI::App* app = vcp.add_subcommand("info", "Say what is in a .vcp file");
-    app->add_option("FILE", command->file, "A .vcp file, a folder of shards, or the http(s) address of either")->type_name("")->required();
+    app->add_option("FILE", command->file, "A .vcp file, a folder of shards, or the http(s) address of either")
+        ->type_name("")
+        ->required();
     addSourceSettings(*app, command->source);
     addJsonOption(*app, command->report);
     return {app, [command] { return run(*command); }};

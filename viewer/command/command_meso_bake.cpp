@@ -124,7 +124,9 @@ RunCommand addMesoBake(CLI::App& meso) {
     auto command = std::make_shared<BakeMeso>();
     BakeOptions& options = command->options;
     CLI::App* app = meso.add_subcommand("bake", "Turn a scan into a base of few triangles with displacement");
-    app->add_option("SCAN", command->scan, "A .vcp file, a folder of shards, or the http(s) address of either")->type_name("")->required();
+    app->add_option("SCAN", command->scan, "A .vcp file, a folder of shards, or the http(s) address of either")
+        ->type_name("")
+        ->required();
     beginGroup(*app, help_group::kOutput);
     app->add_option("-o,--output", command->out,
                     "The folder to write: scene.json for `vcp render`, base.glb and pictures for other programs")

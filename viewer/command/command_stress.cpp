@@ -114,7 +114,9 @@ Command addStress(CLI::App& vcp) {
     auto command = std::make_shared<StressCommand>();
     CLI::App* app =
         vcp.add_subcommand("stress", "Stream under budgets and faults along a camera path, and check every invariant");
-    app->add_option("FILE", command->file, "A .vcp file, a folder of shards, or the http(s) address of either")->type_name("")->required();
+    app->add_option("FILE", command->file, "A .vcp file, a folder of shards, or the http(s) address of either")
+        ->type_name("")
+        ->required();
     app->add_option("--path", command->path,
                     fmt::format("{}, or a file: a JSON array of cameras", fmt::join(stressPathNames(), ", ")))
         ->type_name("PATH")

@@ -206,7 +206,9 @@ Result<int> run(const VerifyCommand& command) {
 Command addVerify(CLI::App& vcp) {
     auto command = std::make_shared<VerifyCommand>();
     CLI::App* app = vcp.add_subcommand("verify", "Check every byte of a .vcp file, and its surface against the mesh");
-    app->add_option("FILE", command->file, "A .vcp file, a folder of shards, or the http(s) address of either")->type_name("")->required();
+    app->add_option("FILE", command->file, "A .vcp file, a folder of shards, or the http(s) address of either")
+        ->type_name("")
+        ->required();
     beginGroup(*app, help_group::kMeasured);
     app->add_option("--against", command->against, "The meshes it was built from: measures the distance, both ways")
         ->type_name("MESH");

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "streaming/http_reader.h"
+#include "streaming/shard/shard_manifest.h"
 #include "viewer/scene/mesh_cache.h"
 #include "viewer/scene/scene_file.h"
 
@@ -36,6 +37,12 @@ std::vector<std::filesystem::path> sideFilesOf(const std::vector<std::string>& i
     if (!folder || (inputs.size() == 1 && isHttpUrl(inputs.front()))) return {};
     build.inputs.assign(inputs.begin(), inputs.end());
     return MeshCache(*folder).sideFilesOf(build);
+}
+
+std::string shownName(const std::string& input) {
+    std::filesystem::path path(input);
+    if (!path.has_filename() || path.filename() == kManifestName) path = path.parent_path();
+    return path.has_filename() ? path.filename().string() : input;
 }
 
 }  // namespace vcp

@@ -23,4 +23,7 @@ Result<std::filesystem::path> datasetFor(const std::vector<std::string>& inputs,
 /// Returns the files that meshes named in datasetFor: material files, images, buffers. None for other inputs.
 std::vector<std::filesystem::path> sideFilesOf(const std::vector<std::string>& inputs, BuildOptions build);
 
+/// Returns how an input is called: the last part of its path or address; of a manifest, its folder's.
+std::string shownName(const std::string& input);
+
 }  // namespace vcp

@@ -157,9 +157,13 @@ Result<fs::path> defaultCacheFolder() {
                  .message = "no folder for the cache: set XDG_CACHE_HOME or HOME, or build with `vcp build` first"};
 }
 
+bool isFolderOfShards(const fs::path& folder) {
+    std::error_code unknown;
+    return fs::is_regular_file(folder / kManifestName, unknown);
+}
+
 bool looksLikeDataset(const fs::path& path) {
-    std::error_code ignored;
-    if (fs::exists(path / kManifestName, ignored)) return true;
+    if (isFolderOfShards(path)) return true;
     std::array<char, 8> start{};
     const FileHeader header;
     const ManifestHeader manifest;

@@ -25,6 +25,8 @@ Result<std::filesystem::path> defaultCacheFolder();
 /// Returns true when the file starts like a .vcp or a manifest of shards, or has the name of one, or is the folder of a
 /// manifest. Returns false also when it cannot be read.
 bool looksLikeDataset(const std::filesystem::path& path);
+/// Whether a folder holds the manifest of a dataset in shards.
+bool isFolderOfShards(const std::filesystem::path& folder);
 
 class MeshCache {
 public:

@@ -4,7 +4,7 @@
 #include <cctype>
 #include <system_error>
 
-#include "streaming/shard/shard_manifest.h"
+#include "viewer/scene/mesh_cache.h"
 
 namespace vcp {
 
@@ -34,12 +34,6 @@ bool looksOpenable(const std::string& name) {
                        [&](const char* extension) { return plain.ends_with(extension); });
 }
 
-std::string shownName(const std::string& opened) {
-    fs::path path(opened);
-    if (!path.has_filename() || path.filename() == kManifestName) path = path.parent_path();
-    return path.has_filename() ? path.filename().string() : opened;
-}
-
 void FileList::read(const fs::path& folder) {
     std::error_code failed;
     folder_ = fs::absolute(folder, failed).lexically_normal();
@@ -49,7 +43,7 @@ void FileList::read(const fs::path& folder) {
     for (; !failed && at != fs::directory_iterator() && entries_.size() < kMostEntries; at.increment(failed)) {
         Entry entry{at->path().filename().string()};
         std::error_code unknown;
-        const bool isInShards = fs::is_regular_file(at->path() / kManifestName, unknown);
+        const bool isInShards = isFolderOfShards(at->path());
         entry.isFolder = !isInShards && at->is_directory(unknown);
         if (entry.name.starts_with('.')) continue;
         if (!entry.isFolder && !isInShards) {

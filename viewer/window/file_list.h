@@ -36,9 +36,6 @@ private:
 /// Whether a file's name is one of a dataset, a scene or a mesh.
 bool looksOpenable(const std::string& name);
 
-/// Returns how a path or an address that was opened is called: its last part; of a manifest, its folder.
-std::string shownName(const std::string& opened);
-
 /// Whether a text holds another, capitals or not (ASCII).
 bool holds(const std::string& text, const std::string& part);
 

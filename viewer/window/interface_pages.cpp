@@ -6,6 +6,7 @@
 #include <imgui.h>
 
 #include "viewer/key_map.h"
+#include "viewer/scene/inputs.h"
 #include "viewer/scene/option_values.h"
 #include "viewer/window/demo_mesh.h"
 #include "viewer/window/icons.h"

@@ -7,6 +7,7 @@
 #include <imgui.h>
 
 #include "tests/support/test_folder.h"
+#include "viewer/scene/inputs.h"
 #include "viewer/window/controls.h"
 #include "viewer/window/demo_mesh.h"
 #include "viewer/window/desktop_theme.h"
