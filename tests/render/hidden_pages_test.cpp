@@ -1,4 +1,6 @@
 // What no ray hits is not read, and the picture is the one with all of it, byte for byte; on a device and on the host.
+#include <map>
+
 #include <gtest/gtest.h>
 
 #include "render/host_renderer.h"
@@ -33,15 +35,21 @@ PlacedDataset placed(const Similarity& placement = {}) {
 
 class HiddenPages : public testing::TestWithParam<const char*> {
 protected:
-    /// A renderer to which nothing has been read.
-    static std::unique_ptr<PictureRenderer> renderer(bool hiddenToo, std::vector<PlacedDataset> datasets = {}) {
+    static void TearDownTestSuite() { renderers().clear(); }
+    /// A renderer of the two with these options, for which nothing has been read: what it showed before is gone, and
+    /// its pipelines are there.
+    static PictureRenderer& renderer(bool hiddenToo, std::vector<PlacedDataset> datasets = {}) {
+        auto& made = renderers()[{GetParam(), hiddenToo}];
+        if (!made) made = newRenderer(hiddenToo);
+        if (datasets.empty()) datasets.push_back(placed());
+        EXPECT_TRUE(made->open(std::move(datasets), {}));
+        return *made;
+    }
+    static std::unique_ptr<PictureRenderer> newRenderer(bool hiddenToo) {
         RendererOptions options;
         options.device = GetParam();
         options.hiddenToo = hiddenToo;
-        auto made = createPictureRenderer(options).value();
-        if (datasets.empty()) datasets.push_back(placed());
-        EXPECT_TRUE(made->open(std::move(datasets), {}));
-        return made;
+        return createPictureRenderer(options).value();
     }
     /// Draws with and without what is hidden, each from nothing; returns what each has in the pool.
     struct Bytes {
@@ -50,18 +58,25 @@ protected:
     static Bytes expectTheSame(const FrameRequest& request) {
         Bytes bytes;
         const auto draw = [&](bool hiddenToo, uint64_t& resident) {
-            const auto drawing = renderer(hiddenToo);
-            const auto drawn = drawing->drawSettled(request);
+            PictureRenderer& drawing = renderer(hiddenToo);
+            const auto drawn = drawing.drawSettled(request);
             EXPECT_TRUE(drawn) << drawn.error().line();
             EXPECT_TRUE(drawn->update.settled);
             EXPECT_GT(drawn->stats.hitPixels, 100u);
             resident = drawn->update.residentBytes;
-            return std::pair(drawing->readPicture().value(), drawing->readDepth().value());
+            return std::pair(drawing.readPicture().value(), drawing.readDepth().value());
         };
         const auto hit = draw(false, bytes.hit), all = draw(true, bytes.all);
         EXPECT_EQ(hit, all);
         EXPECT_LE(bytes.hit, bytes.all);
         return bytes;
+    }
+
+private:
+    using Renderers = std::map<std::pair<std::string, bool>, std::unique_ptr<PictureRenderer>>;
+    static Renderers& renderers() {
+        static Renderers made;
+        return made;
     }
 };
 
@@ -106,54 +121,55 @@ TEST_P(HiddenPages, SectionsOpenWhatIsBehindThem) {
 
 TEST_P(HiddenPages, APictureDoesNotDependOnWhatWasSeenBefore) {
     const auto cameras = test::cameras(kLow, kHigh);
-    const auto moved = renderer(false);
+    const auto moved = newRenderer(false);
+    ASSERT_TRUE(moved->open({placed()}, {}));
     for (const test::NamedCamera& named : cameras) ASSERT_TRUE(moved->drawSettled(requestOf(named.camera)));
     for (const test::NamedCamera& named : cameras) {
         SCOPED_TRACE(named.name);
         ASSERT_TRUE(moved->drawSettled(requestOf(named.camera)));
-        const auto fresh = renderer(false);
-        ASSERT_TRUE(fresh->drawSettled(requestOf(named.camera)));
-        EXPECT_EQ(moved->readPicture().value(), fresh->readPicture().value());
+        PictureRenderer& fresh = renderer(false);
+        ASSERT_TRUE(fresh.drawSettled(requestOf(named.camera)));
+        EXPECT_EQ(moved->readPicture().value(), fresh.readPicture().value());
     }
 }
 
 TEST_P(HiddenPages, SeveralDatasetsAreAskedEachForItself) {
     const FrameRequest request = requestOf(test::cameras(kLow, kHigh)[0].camera);
     const Similarity beside{glm::angleAxis(0.7, glm::normalize(glm::dvec3(1, 2, -0.5))), 0.6, {0.5, 0.2, 0.7}};
-    const auto two = [&](bool hiddenToo) {
+    const auto two = [&](bool hiddenToo) -> PictureRenderer& {
         std::vector<PlacedDataset> datasets;
         datasets.push_back(placed());
         datasets.push_back(placed(beside));
         return renderer(hiddenToo, std::move(datasets));
     };
-    const auto hit = two(false), all = two(true);
-    const auto drawn = hit->drawSettled(request), drawnAll = all->drawSettled(request);
+    PictureRenderer &hit = two(false), &all = two(true);
+    const auto drawn = hit.drawSettled(request), drawnAll = all.drawSettled(request);
     ASSERT_TRUE(drawn && drawnAll);
     EXPECT_LT(drawn->update.residentBytes, drawnAll->update.residentBytes);
-    EXPECT_EQ(hit->readPicture().value(), all->readPicture().value());
+    EXPECT_EQ(hit.readPicture().value(), all.readPicture().value());
 }
 
 TEST_P(HiddenPages, ASettledViewAsksNoMore) {
     const FrameRequest request = requestOf(test::cameras(kLow, kHigh)[0].camera);
-    const auto drawing = renderer(false);
-    UpdateResult update = drawing->update(request).value();
+    PictureRenderer& drawing = renderer(false);
+    UpdateResult update = drawing.update(request).value();
     int frames = 0;
-    for (; !update.settled; update = drawing->update(request).value()) {
+    for (; !update.settled; update = drawing.update(request).value()) {
         ASSERT_LT(frames, 12) << "every frame asks for more";
         if (update.awaitsRays) {
             EXPECT_EQ(update.pagesMissing, 0u);
-            ASSERT_TRUE(drawing->render(request));
+            ASSERT_TRUE(drawing.render(request));
             ++frames;
         } else {
-            drawing->waitForPage(std::chrono::milliseconds(100));
+            drawing.waitForPage(std::chrono::milliseconds(100));
         }
     }
     EXPECT_GT(frames, 1);
-    const Picture settled = drawing->readPicture().value();
+    const Picture settled = drawing.readPicture().value();
     for (int i = 0; i < 3; ++i) {
-        ASSERT_TRUE(drawing->render(request));
-        EXPECT_EQ(drawing->readPicture().value(), settled);
-        const UpdateResult still = drawing->update(request).value();
+        ASSERT_TRUE(drawing.render(request));
+        EXPECT_EQ(drawing.readPicture().value(), settled);
+        const UpdateResult still = drawing.update(request).value();
         EXPECT_TRUE(still.settled);
         EXPECT_FALSE(still.changed);
         EXPECT_EQ(still.loads, update.loads);
@@ -162,17 +178,18 @@ TEST_P(HiddenPages, ASettledViewAsksNoMore) {
 
 // Rays of both hit the same pages: from nothing they read the same.
 TEST(HiddenPagesOfBoth, HostAndDeviceReadTheSame) {
+    std::unique_ptr<PictureRenderer> both[2];
+    for (const bool host : {false, true}) {
+        RendererOptions options;
+        options.device = host ? kHostName : "";
+        both[host ? 1 : 0] = createPictureRenderer(options).value();
+    }
     for (const test::NamedCamera& named : test::cameras(kLow, kHigh)) {
         SCOPED_TRACE(named.name);
         UpdateResult read[2];
-        for (const bool host : {false, true}) {
-            RendererOptions options;
-            options.device = host ? kHostName : "";
-            auto drawing = createPictureRenderer(options).value();
-            std::vector<PlacedDataset> datasets;
-            datasets.push_back(placed());
-            ASSERT_TRUE(drawing->open(std::move(datasets), {}));
-            read[host ? 1 : 0] = drawing->drawSettled(requestOf(named.camera)).value().update;
+        for (const size_t i : {0, 1}) {
+            ASSERT_TRUE(both[i]->open({placed()}, {}));
+            read[i] = both[i]->drawSettled(requestOf(named.camera)).value().update;
         }
         EXPECT_EQ(read[0].pagesResident, read[1].pagesResident);
         EXPECT_EQ(read[0].bytesRead, read[1].bytesRead);
