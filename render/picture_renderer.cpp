@@ -10,6 +10,13 @@ namespace vcp {
 
 namespace {
 
+/// Adds what an update reported before another one to that.
+void takeReports(UpdateResult& before, UpdateResult& now) {
+    now.changed = now.changed || before.changed;
+    now.problems.insert(now.problems.begin(), std::make_move_iterator(before.problems.begin()),
+                        std::make_move_iterator(before.problems.end()));
+}
+
 /// Calls update() until settled, and draws where rays are to say what they hit. `drawn` is what the picture's last
 /// frame came to, where that is the picture that was settled on. What updates report is added to `all`.
 Result<void> settleOn(PictureRenderer& renderer, const FrameRequest& request, const std::function<bool()>& cancel,
@@ -17,9 +24,7 @@ Result<void> settleOn(PictureRenderer& renderer, const FrameRequest& request, co
     while (true) {
         VCP_TRY_ASSIGN(auto next, renderer.update(request));
         if (next.changed) drawn.reset();
-        next.changed = next.changed || all.changed;
-        next.problems.insert(next.problems.begin(), std::make_move_iterator(all.problems.begin()),
-                             std::make_move_iterator(all.problems.end()));
+        takeReports(all, next);
         all = std::move(next);
         if (all.settled) return {};
         if (cancel && cancel()) return Error::cancelled();
@@ -56,12 +61,15 @@ Result<UpdateResult> PictureRenderer::settle(const FrameRequest& request, const 
 Result<SettledFrame> PictureRenderer::drawSettled(const FrameRequest& request, const std::function<bool()>& cancel) {
     // A device that is lost, or short of memory, while it draws leaves out pages that are to be read again.
     constexpr int kMostTurns = 8;
+    UpdateResult before;
     for (int turn = 1;; ++turn) {
         std::optional<FrameStats> drawn;
         VCP_TRY_ASSIGN(auto update, settleAll(*this, request, cancel, drawn));
+        takeReports(before, update);
         if (!drawn) {
             VCP_TRY_ASSIGN(drawn, render(request, cancel));
         }
+        before = update;
         if (turn == kMostTurns || drawn->pagesInCut == update.pagesInCut)
             return SettledFrame{std::move(update), *drawn};
     }

@@ -50,14 +50,18 @@ int exchangeNames(const fs::path& made, const fs::path& name, bool& replaced) {
     const auto rename = [&](unsigned flags) {
         return ::renameat2(AT_FDCWD, made.c_str(), AT_FDCWD, name.c_str(), flags) == 0 ? 0 : errno;
     };
+    const auto isUnknown = [](int failed) { return failed == EINVAL || failed == ENOSYS; };
     replaced = false;
     int failed = rename(RENAME_NOREPLACE);
     if (failed == 0) return 0;
-    if (failed != EINVAL && failed != ENOSYS) {
+    if (!isUnknown(failed)) {
         replaced = true;
-        return rename(RENAME_EXCHANGE);
+        failed = rename(RENAME_EXCHANGE);
+        if (!isUnknown(failed)) return failed;
     }
-    // Such as NFS, which has neither: a folder takes the name of an empty one or of none, else that one steps aside.
+    // Such as on NFS, which knows neither: a folder takes the name of an empty one or of none, else that one steps
+    // aside. Of a name that is there the first flag tells even where it is not known.
+    replaced = false;
     if (::rename(made.c_str(), name.c_str()) == 0) return 0;
     if (errno != ENOTEMPTY && errno != EEXIST) return errno;
     replaced = true;

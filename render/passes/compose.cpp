@@ -7,13 +7,14 @@
 
 namespace vcp {
 
-Result<void> ComposeTarget::resize(Device& device, PictureSize size, bool lit) {
-    if (lit && (size != size_ || light_.bytes() == 0)) {
+Result<bool> ComposeTarget::resize(Device& device, PictureSize size, bool lit) {
+    if (size == size_ && lit == (light_.bytes() > 0)) return false;
+    if (lit) {
         VCP_TRY_ASSIGN(light_, device.createBuffer(size.pixels() * 4 * frame::kScenePlanes,
                                                    VK_BUFFER_USAGE_STORAGE_BUFFER_BIT, MemoryUse::Local));
     }
     if (!lit) light_ = {};
-    if (size == size_) return {};
+    if (size == size_) return true;
     VCP_TRY_ASSIGN(auto depths,
                    device.createBuffer((size.pixels() + 1) * 4,
                                        VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_SRC_BIT |
@@ -24,7 +25,7 @@ Result<void> ComposeTarget::resize(Device& device, PictureSize size, bool lit) {
     }
     depths_ = std::move(depths);
     size_ = size;
-    return {};
+    return true;
 }
 
 void ComposeTarget::clear(VkCommandBuffer commands) const {

@@ -12,8 +12,9 @@ namespace vcp {
 /// What the pictures are composed into: one target a view, as large as its picture.
 class ComposeTarget {
 public:
-    /// Makes the depths as large as the picture, and with `lit` the planes of light. Errors: Device.
-    Result<void> resize(Device& device, PictureSize size, bool lit);
+    /// Makes the depths as large as the picture, and with `lit` the planes of light. Returns whether any is new or
+    /// gone. Errors: Device.
+    Result<bool> resize(Device& device, PictureSize size, bool lit);
     /// Marks all pixels as not hit, before the first dataset of a frame. Between begin() and the passes' first barrier.
     void clear(VkCommandBuffer commands) const;
     [[nodiscard]] const Buffer& depths() const { return depths_; }

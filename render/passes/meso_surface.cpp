@@ -64,7 +64,6 @@ Result<void> MesoSurfacePass::setSurfaces(std::span<const MesoSurface> surfaces)
             VCP_TRY_ASSIGN(auto shell, resources_.vectors(surface.shell.texels));
             made.shell = std::move(shell);
         }
-        VCP_TRY_ASSIGN(made.constants, device_.createBuffer(sizeof(MesoConstants), kConstantsUse, MemoryUse::Local));
         made.origin = surface.shell.origin;
         placed.push_back(std::move(made));
     }
@@ -99,18 +98,21 @@ Result<void> MesoSurfacePass::makeTarget(MesoTarget& target, PictureSize size, c
     for (const Placed& surface : surfaces_) {
         const bool isRemeshed = surface.remeshed.surface != nullptr;
         const auto& [hits, normals] = target.remeshed.copies;
-        VCP_TRY_ASSIGN(auto set,
-                       resources_.makeSet({&surface.constants, isRemeshed ? &normals : surface.words.get(),
+        MesoTarget::Drawing drawing;
+        VCP_TRY_ASSIGN(drawing.constants, device_.createBuffer(sizeof(MesoConstants), kConstantsUse, MemoryUse::Local));
+        VCP_TRY_ASSIGN(drawing.set,
+                       resources_.makeSet({&drawing.constants, isRemeshed ? &normals : surface.words.get(),
                                            isRemeshed ? &hits : &surface.shell, &target.hits, picture.colours,
                                            &target.counters, surface.look.get(), picture.sceneLight, picture.depths}));
-        target.sets.push_back(std::move(set));
+        target.drawings.push_back(std::move(drawing));
     }
     target.size = size, target.surfaces = version_, target.picture = picture.colours->handle();
-    target.sceneLight = handleOf(picture.sceneLight);
+    target.sceneLight = handleOf(picture.sceneLight), target.depths = picture.depths->handle();
     return {};
 }
 
-Result<void> MesoSurfacePass::choosePipelines(Placed& surface, const Shading& shading, bool inScene) {
+Result<void> MesoSurfacePass::choosePipelines(const Placed& surface, MesoTarget::Drawing& drawing,
+                                              const Shading& shading, bool inScene) {
     const std::vector<uint32_t> march =
         surface.arrays ? wordsOf(surface.arrays->constants) : wordsOf(meso::MarchConstants());
     const auto choose = [&](std::span<const uint32_t> spirv, uint32_t rays, uint32_t textures) {
@@ -119,17 +121,17 @@ Result<void> MesoSurfacePass::choosePipelines(Placed& surface, const Shading& sh
         return resources_.pipeline(spirv, constants);
     };
     if (surface.remeshed.surface) {
-        VCP_TRY_ASSIGN(surface.cast, choose(kRemeshMergeSpirv, kPictureRays, surface.textures));
+        VCP_TRY_ASSIGN(drawing.cast, choose(kRemeshMergeSpirv, kPictureRays, surface.textures));
         return {};
     }
-    VCP_TRY_ASSIGN(surface.cast, choose(kMesoSurfaceSpirv, kPictureRays, surface.textures));
+    VCP_TRY_ASSIGN(drawing.cast, choose(kMesoSurfaceSpirv, kPictureRays, surface.textures));
     // Rays of light read no textures.
     if (hasMesoShadows(shading)) {
-        VkPipeline& lights = inScene ? surface.sun : surface.shadow;
+        VkPipeline& lights = inScene ? drawing.sun : drawing.shadow;
         VCP_TRY_ASSIGN(lights, choose(kMesoSurfaceSpirv, inScene ? kRayToLight : kRaysToLights, 0));
     }
     if (inScene && shading.occlusionRays > 0) {
-        VCP_TRY_ASSIGN(surface.sky, choose(kMesoSurfaceSpirv, kRayIntoSky, 0));
+        VCP_TRY_ASSIGN(drawing.sky, choose(kMesoSurfaceSpirv, kRayIntoSky, 0));
     }
     return {};
 }
@@ -137,15 +139,16 @@ Result<void> MesoSurfacePass::choosePipelines(Placed& surface, const Shading& sh
 Result<void> MesoSurfacePass::prepare(MesoTarget& target, const Picture& picture, const FrameRequest& request) {
     const PictureSize size = sizeOf(request);
     if (!(size == target.size) || target.surfaces != version_ || target.picture != picture.colours->handle() ||
-        target.sceneLight != handleOf(picture.sceneLight))
+        target.sceneLight != handleOf(picture.sceneLight) || target.depths != picture.depths->handle())
         VCP_TRY(makeTarget(target, size, picture));
     const bool inScene = picture.sceneLight != nullptr;
-    for (Placed& surface : surfaces_) {
-        VCP_TRY(choosePipelines(surface, request.shading, inScene));
+    for (size_t i = 0; i < surfaces_.size(); ++i) {
+        const Placed& surface = surfaces_[i];
+        VCP_TRY(choosePipelines(surface, target.drawings[i], request.shading, inScene));
         if (surface.remeshed.surface)
             VCP_TRY(raster_.remesh(target.remeshed, surface.number, surface.remeshed, remeshLook(request)));
     }
-    VCP_TRY_ASSIGN(shade_, resources_.pipeline(kMesoShadeSpirv, {0, 0, 0, 0, 0, 0, 0, inScene ? 1u : 0u}));
+    VCP_TRY_ASSIGN(target.shade, resources_.pipeline(kMesoShadeSpirv, {0, 0, 0, 0, 0, 0, 0, inScene ? 1u : 0u}));
     return {};
 }
 
@@ -161,7 +164,7 @@ void MesoSurfacePass::dispatch(VkCommandBuffer commands, VkPipeline pipeline, co
                                size_t surface) const {
     vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipeline);
     vkCmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_COMPUTE, resources_.layout(), 0, 1,
-                            &target.sets[surface].set, 0, nullptr);
+                            &target.drawings[surface].set.set, 0, nullptr);
     vkCmdDispatch(commands, (target.size.width + 7) / 8, (target.size.height + 7) / 8, 1);
     barrierComputeToCompute(commands);
 }
@@ -183,16 +186,16 @@ void MesoSurfacePass::recordHits(VkCommandBuffer commands, const MesoTarget& tar
     vkCmdCopyBuffer(commands, picture.depths->handle(), target.hits.handle(), 1, &region);
     vkCmdFillBuffer(commands, target.hits.handle(), plane, (frame::kMesoPlanes - 1) * plane, 0);
     vkCmdFillBuffer(commands, target.counters.handle(), 0, VK_WHOLE_SIZE, 0);
-    for (const Placed& surface : surfaces_) {
-        const MesoConstants constants = constantsOf(surface, request);
-        vkCmdUpdateBuffer(commands, surface.constants.handle(), 0, sizeof constants, &constants);
+    for (size_t i = 0; i < surfaces_.size(); ++i) {
+        const MesoConstants constants = constantsOf(surfaces_[i], request);
+        vkCmdUpdateBuffer(commands, target.drawings[i].constants.handle(), 0, sizeof constants, &constants);
     }
     barrierToAll(commands);
-    push(commands, {});
     for (size_t i = 0; i < surfaces_.size(); ++i) {
         if (surfaces_[i].remeshed.surface)
             raster_.record(commands, target.remeshed, surfaces_[i].number, surfaces_[i].remeshed, remeshLook(request));
-        dispatch(commands, surfaces_[i].cast, target, i);
+        push(commands, {});
+        dispatch(commands, target.drawings[i].cast, target, i);
     }
 }
 
@@ -206,7 +209,7 @@ void MesoSurfacePass::recordRay(VkCommandBuffer commands, const MesoTarget& targ
         through.isLast = ray.isLast != 0 && i == marched.back() ? 1 : 0;
         push(commands, through);
         const bool isSun = ray.number > frame::kSunRay - frame::kMaxLights;
-        dispatch(commands, isSun ? surfaces_[i].sun : surfaces_[i].sky, target, i);
+        dispatch(commands, isSun ? target.drawings[i].sun : target.drawings[i].sky, target, i);
     }
 }
 
@@ -215,9 +218,9 @@ void MesoSurfacePass::recordShade(VkCommandBuffer commands, const MesoTarget& ta
     const uint64_t plane = target.size.pixels() * 4;
     if (target.sceneLight == VK_NULL_HANDLE && hasMesoShadows(request.shading))
         for (size_t i = 0; i < surfaces_.size(); ++i)
-            if (!surfaces_[i].remeshed.surface) dispatch(commands, surfaces_[i].shadow, target, i);
+            if (!surfaces_[i].remeshed.surface) dispatch(commands, target.drawings[i].shadow, target, i);
     push(commands, {.occlusionRays = request.shading.occlusionRays});
-    dispatch(commands, shade_, target, 0);
+    dispatch(commands, target.shade, target, 0);
     barrierComputeToReadback(commands);
     const VkBufferCopy counts{0, offsetof(MesoReport, counts), sizeof(MesoCounts)};
     vkCmdCopyBuffer(commands, target.counters.handle(), target.reported.handle(), 1, &counts);

@@ -38,14 +38,22 @@ struct MesoReport {
 
 /// What one view's pictures of the surfaces are drawn into.
 struct MesoTarget {
+    /// What one surface is drawn with. `sun` and `sky` cast one ray from all that is seen.
+    struct Drawing {
+        Buffer constants;
+        MesoSet set;
+        VkPipeline cast = VK_NULL_HANDLE, shadow = VK_NULL_HANDLE, sun = VK_NULL_HANDLE, sky = VK_NULL_HANDLE;
+    };
     PictureSize size;       ///< 0: nothing is made
     uint64_t surfaces = 0;  ///< MesoSurfacePass::version() for which the sets were made
     Buffer hits, counters;
     Buffer reported;                       ///< MesoReport
     VkBuffer picture = VK_NULL_HANDLE;     ///< not owned; in the sets
     VkBuffer sceneLight = VK_NULL_HANDLE;  ///< the same; null where surfaces and datasets do not shade each other
+    VkBuffer depths = VK_NULL_HANDLE;      ///< the same
     RemeshTarget remeshed;
-    std::vector<MesoSet> sets;  ///< one for each surface
+    std::vector<Drawing> drawings;  ///< one for each surface
+    VkPipeline shade = VK_NULL_HANDLE;
 
     /// Returns what a frame told. Precondition: the frame is done.
     [[nodiscard]] MesoReport report() const;
@@ -89,16 +97,14 @@ private:
         MesoTexels shell;
         RemeshedSurface remeshed;
         size_t number = 0;  ///< among those that are remeshed
-        Buffer constants;
         glm::dvec3 origin;
         frame::MesoView view{};  ///< what does not depend on the picture
         uint32_t textures = 0;
         bool isFarDrawn = false;
-        /// `sun` and `sky` cast one ray from all that is seen.
-        VkPipeline cast = VK_NULL_HANDLE, shadow = VK_NULL_HANDLE, sun = VK_NULL_HANDLE, sky = VK_NULL_HANDLE;
     };
     Result<void> makeTarget(MesoTarget& target, PictureSize size, const Picture& picture);
-    Result<void> choosePipelines(Placed& surface, const Shading& shading, bool inScene);
+    Result<void> choosePipelines(const Placed& surface, MesoTarget::Drawing& drawing, const Shading& shading,
+                                 bool inScene);
     MesoConstants constantsOf(const Placed& surface, const FrameRequest& request) const;
     /// Records the ray that the next dispatches cast.
     void push(VkCommandBuffer commands, const frame::MesoLightRay& ray) const;
@@ -110,7 +116,6 @@ private:
     std::vector<Placed> surfaces_;
     size_t remeshed_ = 0;  ///< number of those that are
     uint64_t version_ = 0;
-    VkPipeline shade_ = VK_NULL_HANDLE;
 };
 
 }  // namespace vcp

@@ -7,9 +7,9 @@ uint scenePlane() { return view.width * view.height; }
 // Bits of a light in a plane of light: the one light has all eight.
 uint lightBits(uint number) { return view.lightCount == 1u ? 255u : 1u << number; }
 
-// Makes a hit on the surface what the picture shows.
-void keepInScene(uint pixel, float depth, uint normal, bool isFar) {
+// Makes a hit on the surface what the picture shows. `lift`: by which rays of light begin above it.
+void keepInScene(uint pixel, float depth, uint normal, float lift, bool isFar) {
     targetDepths[pixel] = floatBitsToUint(depth);
     sceneLight[sceneAt(kSceneNormal, pixel)] = normal;
-    sceneLight[sceneAt(kSceneLift, pixel)] = floatBitsToUint(isFar ? -view.shadowLift : view.shadowLift);
+    sceneLight[sceneAt(kSceneLift, pixel)] = floatBitsToUint(isFar ? -lift : lift);
 }

@@ -115,5 +115,5 @@ void main() {
     hits[kMesoPlaneNormal * plane + index] = code;
     hits[kMesoPlaneLook * plane + index] = packUnorm4x8(vec4(look.colour, look.sky));
     hits[kMesoPlaneLight * plane + index] = packUnorm4x8(look.light);
-    if (kScene != 0u) keepInScene(index, kept.first + hit.t, code, look.sky < 1.0);
+    if (kScene != 0u) keepInScene(index, kept.first + hit.t, code, view.shadowLift, look.sky < 1.0);
 }

@@ -28,5 +28,10 @@ void main() {
     hits[kMesoPlaneLook * plane + index] = packUnorm4x8(look);
     hits[kMesoPlaneLight * plane + index] = ~0u;  // before shadows, all of each light arrives
     hits[kMesoPlaneIterations * plane + index] += 1u;
-    if (kScene != 0u) keepInScene(index, hit.x, code, false);
+    if (kScene == 0u) return;
+    // Triangles are as large as pixels: rays of light begin half a pixel above them.
+    vec2 at = vec2(pixel) + 0.5;
+    vec3 towards = view.forward.xyz + at.x * view.forwardX.xyz + at.y * view.forwardY.xyz;
+    float width = length(view.eyeX.xyz) + length(view.forwardX.xyz) / length(towards) * hit.x;
+    keepInScene(index, hit.x, code, max(view.shadowLift, 0.5 * width), false);
 }

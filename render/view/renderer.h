@@ -76,8 +76,8 @@ public:
     /// Shows surfaces with mesostructure, in all views, in place of those before. They are drawn over the open
     /// datasets; the nearer surface is seen at each pixel. They take light, shadows, normals, unlit colours and steps
     /// (their iterations, 0 to 100) from the request; a surface that strays less than the request's errorPixels from
-    /// its mean height is shown by its light from far. Section planes cut them; where the processor casts, they and the
-    /// datasets shade each other. Their bytes are taken from the pool's budget. The renderer keeps them to upload to a
+    /// its mean height is shown by its light from far. Section planes cut them; they and the datasets shade each
+    /// other. Their bytes are taken from the pool's budget. The renderer keeps them to upload to a
     /// device that is made anew. Without any, nothing is made for them. After an error there are none. Errors: Device,
     /// Limit.
     Result<void> setSurfaces(std::span<const MesoSurface> surfaces) override;

@@ -103,7 +103,8 @@ Result<void> Renderer::View::prepare(Frame& frame, size_t i) {
     drawing.images = constants.images ? shared->images[layer.number].words : nullptr;
     resources.setImages(drawing.images.get());
     if (shared->composes()) {
-        VCP_TRY(frame.target.resize(*shared->device, resources.size(), frame.isLit));
+        VCP_TRY_ASSIGN(const bool isNew, frame.target.resize(*shared->device, resources.size(), frame.isLit));
+        if (isNew) frame.surfaces = {};  // a handle may be used again
         resources.setTarget(&frame.layers.front().resources->picture(), &frame.target.depths(), frame.target.light());
     }
     if (drawing.reports()) VCP_TRY(drawing.feedback.prepare(*shared->device, resources, layer.table));

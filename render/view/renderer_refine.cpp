@@ -19,7 +19,8 @@ constexpr uint32_t kSurfaceRays = 8;
 uint32_t raysPerPixel(const FrameRequest& request, bool hasSurfaces) {
     const Shading& shading = request.shading;
     const uint32_t light = hasLight(shading) ? (castsShadows(shading) ? 1 : 0) + shading.occlusionRays : 0;
-    return 1 + light + (hasSurfaces ? kSurfaceRays : 0);
+    // Each of these goes through surfaces, too.
+    return (1 + light) * (1 + (hasSurfaces ? kSurfaceRays : 0));
 }
 
 Result<uint32_t> Renderer::refineAhead() {

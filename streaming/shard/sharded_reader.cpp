@@ -85,10 +85,12 @@ std::shared_ptr<ShardedReader::Shard> ShardedReader::slotOf(uint64_t number) con
     if (!slot) slot = std::make_shared<Shard>();
     slot->lastUse = ++uses_;
     const auto found = slot;
-    if (open_.size() > kMostOpen)
-        open_.erase(std::min_element(open_.begin(), open_.end(), [](const auto& a, const auto& b) {
-            return a.second->lastUse < b.second->lastUse;
-        }));
+    if (open_.size() <= kMostOpen) return found;
+    // What is being opened stays, so that it is opened once and can be interrupted.
+    const auto age = [](const auto& entry) { return entry.second->stop ? UINT64_MAX : entry.second->lastUse; };
+    const auto oldest =
+        std::min_element(open_.begin(), open_.end(), [&](const auto& a, const auto& b) { return age(a) < age(b); });
+    if (!oldest->second->stop && oldest->second != found) open_.erase(oldest);
     return found;
 }
 
@@ -104,19 +106,25 @@ Result<std::shared_ptr<const ByteReader>> ShardedReader::shardFile(uint64_t numb
         if (interrupts_ != interrupts) return Error::cancelled(name());
         slot->stop = stop;
     }
-    VCP_TRY_ASSIGN(const auto row, manifest_->shard(number));
-    VCP_TRY_ASSIGN(auto file, openShard_(row, number == 0, [stop] { return stop->load(); }));
-    if (file->size() != row.bytes)
-        return Error{.code = ErrorCode::InvalidInput,
-                     .message = fmt::format("has {} bytes, and {} says {}: it is another file, or was truncated",
-                                            file->size(), name(), row.bytes),
-                     .file = file->name()};
+    const auto file = openedShard(number, [stop] { return stop->load(); });
     const std::lock_guard lock(mutex_);
-    slot->file = file;
     slot->stop.reset();
     *stop = false;  // later reads of the file work
+    if (!file) return file;
+    slot->file = *file;
     if (interrupts_ != interrupts) return Error::cancelled(name());
     return file;
+}
+
+Result<std::shared_ptr<const ByteReader>> ShardedReader::openedShard(uint64_t number,
+                                                                     const std::function<bool()>& cancelled) const {
+    VCP_TRY_ASSIGN(const auto row, manifest_->shard(number));
+    VCP_TRY_ASSIGN(auto file, openShard_(row, number == 0, cancelled));
+    if (file->size() == row.bytes) return file;
+    return Error{.code = ErrorCode::InvalidInput,
+                 .message = fmt::format("has {} bytes, and {} says {}: it is another file, or was truncated",
+                                        file->size(), name(), row.bytes),
+                 .file = file->name()};
 }
 
 void ShardedReader::interrupt() const {

@@ -50,6 +50,8 @@ private:
     ShardedReader(std::unique_ptr<ShardManifest> manifest, OpenShard openShard)
         : manifest_(std::move(manifest)), openShard_(std::move(openShard)) {}
     [[nodiscard]] std::shared_ptr<Shard> slotOf(uint64_t number) const;
+    [[nodiscard]] Result<std::shared_ptr<const ByteReader>> openedShard(uint64_t number,
+                                                                        const std::function<bool()>& cancelled) const;
     Result<void> readDirectory(uint64_t offset, std::span<std::byte> bytes) const;
     Result<void> makeBlocks(uint64_t first, std::span<std::byte> made) const;
     [[nodiscard]] Result<std::vector<Segment>> segments(uint64_t firstPage, uint64_t endPage) const;

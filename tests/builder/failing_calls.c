@@ -70,7 +70,8 @@ int fdatasync(int fd) { return fails() ? -1 : REAL(fdatasync)(fd); }
 int rename(const char* from, const char* to) { return fails() ? -1 : REAL(rename)(from, to); }
 int renameat2(int folder, const char* from, int other, const char* to, unsigned flags) {
     if (flags == 0 || !getenv("FAIL_FLAGS")) return REAL(renameat2)(folder, from, other, to, flags);
-    errno = EINVAL;
+    /* Linux sees by itself that a name is there. */
+    errno = flags == RENAME_NOREPLACE && faccessat(other, to, F_OK, 0) == 0 ? EEXIST : EINVAL;
     return -1;
 }
 int ftruncate(int fd, off_t size) { return fails() ? -1 : REAL(ftruncate)(fd, size); }

@@ -5,6 +5,8 @@ const kFirstDelay = 300; // ms; twice as long after each failure
 
 /// What went wrong with the server: a line for people. Trying again does not help.
 export class ServerError extends Error {}
+/// The server does not have the file.
+export class MissingFile extends ServerError {}
 
 /// Returns the first byte and the size of the whole file that a Content-Range names; nothing where it is none.
 export function parseContentRange(text) {
@@ -102,7 +104,7 @@ export class Ranges {
     check(answer, offset) {
         if (answer.status === 200)
             throw new ServerError(`${this.url}: the server ignores ranges and sends the whole file; use one that knows Range requests`);
-        if (answer.status === 404) throw new ServerError(`${this.url}: the server has no such file`);
+        if (answer.status === 404 || answer.status === 410) throw new MissingFile(`${this.url}: the server has no such file`);
         if (answer.status === 416)
             throw new ServerError(`${this.url}: the file on the server is shorter than before; reload the page`);
         if (answer.status >= 400 && answer.status < 500 && answer.status !== 408 && answer.status !== 429)

@@ -1,7 +1,7 @@
 // The first worker of a viewer: fetches, decodes, chooses pages and draws, with others where there are any (share.js), so
 // that the page never waits.
 import { Module } from './module.js';
-import { Files, ServerError, joined, overlap, urgentFirst, without } from './ranges.js';
+import { Files, MissingFile, joined, overlap, urgentFirst, without } from './ranges.js';
 import { Caster, costsOf, partsOf } from './share.js';
 
 const kLead = 64 << 10;      // bytes of the first request: header, directory and the coarsest pages
@@ -66,7 +66,7 @@ function fetchPart(part) {
         })
         .catch(error => {
             // Without one of several files the others are shown.
-            if (error instanceof ServerError && module.placeOf(part.offset).name !== '') module.lose(part.offset, error.message);
+            if (error instanceof MissingFile && module.placeOf(part.offset).name !== '') module.lose(part.offset, error.message);
             else failed = error;
         })
         .finally(() => {

@@ -361,6 +361,33 @@ TEST_F(HostSurfaces, WhatTheyCastOnEachOtherIsTheSame) {
         one, [](FrameRequest& request) { request.shading.shadows = true; }, 4);
 }
 
+// What takes a software device long is drawn in steps, between which another view draws the same surfaces.
+TEST_F(HostSurfaces, StepByStepBesideAnotherViewTheyAreTheSame) {
+    const auto scene = test::sphereScene(1);
+    const BallOverSlab truth{{0.1, -0.05, 0.65}};
+    ASSERT_TRUE(renderer_->open({{scene.dataset, scene.source, truth.placement()}},
+                                std::vector{mesoSurface(relief(), "boxes", "quad", 0.3)}));
+    FrameRequest request = lookFrom(views()[0]), smaller = lookFrom(views()[1]);
+    request.shading.occlusionRays = 16;
+    request.shading.shadows = true;
+    smaller.width = 64, smaller.height = 48;
+    smaller.shading.shadows = true;
+    const Picture expected = test::drawnBy(*renderer_, request).picture;
+    auto other = renderer_->addView();
+    ASSERT_TRUE(other) << other.error().line();
+    const Picture beside = test::drawnBy(**other, smaller).picture;
+    ASSERT_TRUE(renderer_->settle(request) && renderer_->renderAhead(request));
+    ASSERT_TRUE(renderer_->isUnfinished());
+    int steps = 0;
+    for (; renderer_->isUnfinished(); ++steps) {
+        ASSERT_TRUE((*other)->render(smaller));
+        ASSERT_TRUE(renderer_->continueFrame());
+    }
+    EXPECT_GT(steps, 20);
+    EXPECT_EQ(renderer_->readPicture().value(), expected);
+    EXPECT_EQ((*other)->readPicture().value(), beside);
+}
+
 /// With rays into the sky, a scan stands in a hollow of light on the relief, and is darker next to it.
 TEST_F(HostSurfaces, ScanAndReliefOccludeEachOther) {
     const auto scene = test::sphereScene(1);

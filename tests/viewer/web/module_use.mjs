@@ -7,7 +7,7 @@ import { pathToFileURL } from 'node:url';
 const web = process.argv[2];
 const file = name => import(pathToFileURL(path.join(web, name)));
 export const { Module } = await file('module.js');
-export const { Files, Ranges, ServerError, joined, parseContentRange, urgentFirst, without } = await file('ranges.js');
+export const { Files, MissingFile, Ranges, joined, parseContentRange, urgentFirst, without } = await file('ranges.js');
 export const { Caster, costsOf, partsOf } = await file('share.js');
 export const { Orbit, kFieldOfView, movingScale } = await file('camera.js');
 export const wasm = fs.readFileSync(path.join(web, 'vcp.wasm'));
@@ -37,7 +37,7 @@ export async function supply(module, ranges) {
             module.supply(offset, await ranges.read(offset, bytes));
         } catch (error) {
             // As the worker does.
-            if (!(error instanceof ServerError && module.placeOf(offset).name !== '')) throw error;
+            if (!(error instanceof MissingFile && module.placeOf(offset).name !== '')) throw error;
             module.lose(offset, error.message);
         }
 }

@@ -32,7 +32,7 @@ bool FetchedBytes::read(uint64_t offset, std::span<std::byte> bytes) {
             std::memcpy(bytes.data() + (at - offset), piece.bytes.data() + (at - piece.offset), until - at);
         }
         if (until == at) {
-            missing_.push_back({at, next - at});
+            if (whyLost(at) == nullptr) missing_.push_back({at, next - at});
             isWhole = false;
             until = next;
         }
@@ -51,10 +51,9 @@ Result<void> FetchedFile::read(uint64_t offset, std::span<std::byte> bytes) cons
     if (offset > size_ || bytes.size() > size_ - offset)
         return Error{
             .code = ErrorCode::Io, .message = "the file ends here; it was truncated", .file = name_, .byte = offset};
-    if (const std::string* const why = bytes_->whyLost(begin_ + offset))
-        return Error{.code = ErrorCode::Io, .message = *why};
     if (bytes_->read(begin_ + offset, bytes)) return {};
-    return Error::cancelled(name_);
+    const std::string* const why = bytes_->whyLost(begin_ + offset);
+    return why != nullptr ? Error{.code = ErrorCode::Io, .message = *why} : Error::cancelled(name_);
 }
 
 Result<std::shared_ptr<FetchedDataset>> FetchedDataset::open(const std::shared_ptr<FetchedBytes>& bytes, uint64_t size,
