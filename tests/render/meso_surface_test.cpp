@@ -154,7 +154,7 @@ TEST_F(MesoSurfaces, WaysToSkipShowTheSame) {
         Asset asset;
         asset.name = asset.solid = name;
         asset.extent = meso::test::solid(name)->extent();
-        const auto depthsAndWork = [&](const char* method, uint64_t& work) {
+        const auto depthsAndWork = [&, base = base](const char* method, uint64_t& work) {
             draw({mesoSurface(asset, method, base, 0.2)}, request);
             const auto iterations = *renderer_->readIterations();
             work = std::accumulate(iterations.begin(), iterations.end(), work);

@@ -77,7 +77,7 @@ std::vector<double> squaredDistances(const std::vector<uint8_t>& marked, glm::iv
 }
 
 std::vector<uint8_t> outlineOf(const LightPicture& picture) {
-    const auto [width, height] = std::pair(picture.size.x, picture.size.y);
+    const int width = picture.size.x, height = picture.size.y;
     std::vector<uint8_t> outline(picture.coverage.size(), 0);
     for (int y = 0; y < height; ++y)
         for (int x = 0; x < width; ++x) {
