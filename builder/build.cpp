@@ -323,7 +323,7 @@ private:
     }
 
     /// Returns how many triangles a bin may have: parts need several bins each, to be equally large.
-    [[nodiscard]] uint64_t binTriangles(const PageChoice& choice) const {
+    [[nodiscard]] uint64_t binTriangles(const FinestPageChoice& choice) const {
         const uint64_t most = memory_.binTriangles(mayKeepImages());
         if (parts_ == 0) return most;
         uint64_t all = 0;
@@ -353,7 +353,7 @@ private:
         return {};
     }
 
-    Result<PageChoice> choosePagesOnGrid() {
+    Result<FinestPageChoice> choosePagesOnGrid() {
         // Pages of soft leaves must be of one level: their levels come from each other by clustering.
         const PageChoosing choosing{
             .soup = *files_.soup,

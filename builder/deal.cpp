@@ -275,12 +275,12 @@ uint32_t levelsTooMany(const PageCounts& pages, uint64_t triangles) {
 
 }  // namespace
 
-Result<PageChoice> choosePages(const PageChoosing& choosing) {
+Result<FinestPageChoice> choosePages(const PageChoosing& choosing) {
     Parting parting({choosing.frame.log2Cells, choosing.frame.levels - 1}, choosing.mostLevelsBelow);
     const uint64_t triangles = trianglesOf(choosing.soup);
     const uint64_t uncounted =
         choosing.mostLevelsBelow > 0 ? std::min(choosing.uncounted, kMostPageTriangles) : choosing.uncounted;
-    PageChoice choice{parting.pages(), {}};
+    FinestPageChoice choice{parting.pages(), {}};
     if (triangles <= uncounted && !choosing.mayBeCoarser) return choice;
     for (int round = 0;; ++round) {
         // Each round takes half of what is left of the progress.

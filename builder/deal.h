@@ -24,7 +24,7 @@ inline constexpr double kMostGrowth = 1.5;
 /// each takes some hundred bytes by itself. So many pages are free.
 inline constexpr uint64_t kLeastPageTriangles = 24, kFreePages = 64;
 
-struct PageChoice {
+struct FinestPageChoice {
     FinestPages pages;
     /// First codes of pages and how many triangles each needs, ascending; empty where there are so few triangles that
     /// nothing was counted.
@@ -47,7 +47,7 @@ struct PageChoosing {
 
 /// Chooses the pages that hold the mesh. Errors: Io, Cancelled; Limit (more pages than can be counted; the message
 /// lacks what to do).
-Result<PageChoice> choosePages(const PageChoosing& choosing);
+Result<FinestPageChoice> choosePages(const PageChoosing& choosing);
 
 /// What is dealt. The calling arena's threads do the work.
 struct Dealing {

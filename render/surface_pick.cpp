@@ -29,7 +29,7 @@ double stretchOf(const meso::Shell& shell, int piece) {
     return std::sqrt(sum);
 }
 
-std::optional<double> errorAt(const MesoSurface& surface, const SurfaceHit& hit) {
+std::optional<double> errorAt(const MesoSurface& surface, const MesoHit& hit) {
     const auto known = knownError(*surface.arrays);
     if (!known) return {};
     const meso::Shell& shell = surface.shell;
@@ -43,7 +43,7 @@ std::optional<SurfacePoint> pickOnSurfaces(std::span<const MesoSurface> surfaces
                                            glm::dvec3 direction, std::span<const SectionPlane> sections) {
     std::optional<SurfacePoint> nearest;
     const PictureRays rays{.origin = origin, .direction = direction, .size = {1, 1}, .sections = sectionCuts(sections)};
-    SurfaceHit hit;
+    MesoHit hit;
     hit.depth = std::numeric_limits<float>::infinity();
     for (const MesoSurface& surface : surfaces) {
         if (!surface.arrays) continue;

@@ -162,7 +162,7 @@ private:
     void castSurface(SurfaceCaster& caster, glm::ivec2 corner, SurfaceWork& work) {
         forEachPixel(picture_.size, corner, [&](glm::ivec2 pixel, int) {
             const size_t to = at(pixel);
-            SurfaceHit hit;
+            MesoHit hit;
             hit.depth = picture_.depth[to];
             if (!caster.castPixel(pixel, hit, picture_.iterations[to], work)) return;
             picture_.depth[to] = hit.depth;

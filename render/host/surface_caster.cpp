@@ -28,7 +28,7 @@ SurfaceCaster::SurfaceCaster(const HostSurface& surface) : surface_(surface), ca
 SurfaceCaster::SurfaceCaster(const SurfaceCaster& other) : SurfaceCaster(other.surface_) {}
 SurfaceCaster::~SurfaceCaster() = default;
 
-bool SurfaceCaster::castPixel(glm::ivec2 pixel, SurfaceHit& hit, uint32_t& iterations, SurfaceWork& work) {
+bool SurfaceCaster::castPixel(glm::ivec2 pixel, MesoHit& hit, uint32_t& iterations, SurfaceWork& work) {
     Cast& cast = *cast_;
     const auto [origin, towards] = cast.rayOf(pixel);
     const glm::vec3 d = glm::normalize(towards);

@@ -26,7 +26,7 @@ struct HostSurface {
 };
 
 /// What the ray of a pixel hit. Lengths are world units, directions have the world's axes.
-struct SurfaceHit {
+struct MesoHit {
     float depth = 0;  ///< along the unit ray
     glm::vec3 normal{0};
     glm::vec3 colour{0};  ///< encoded for the screen
@@ -52,7 +52,7 @@ public:
 
     /// Casts a pixel's ray no farther than hit.depth. Returns whether it hit; only then it writes `hit`. Adds to
     /// `iterations`.
-    bool castPixel(glm::ivec2 pixel, SurfaceHit& hit, uint32_t& iterations, SurfaceWork& work);
+    bool castPixel(glm::ivec2 pixel, MesoHit& hit, uint32_t& iterations, SurfaceWork& work);
 
     /// Where a ray of light begins: above what a pixel shows.
     struct Start {

@@ -2,6 +2,7 @@
 #include "tests/house/include_rules.h"
 
 #include <algorithm>
+#include <map>
 #include <regex>
 #include <set>
 #include <sstream>
@@ -50,6 +51,48 @@ TEST(IncludeRules, EveryRoomKeepsTheArrows) {
                 ADD_FAILURE() << fs::relative(file, kRoot).string() << ": " << violation;
         }
     EXPECT_GT(checked, 300u);
+}
+
+/// Returns the types that a file defines in a named namespace, each with its namespace.
+std::vector<std::string> typesIn(const std::string& text) {
+    static const std::regex opens(R"(^(?:inline )?namespace ?([\w:]*) ?\{)"), closes(R"(^\}  // namespace)");
+    static const std::regex type(
+        R"(^(?:template <.*> )?(?:struct|class|enum|enum class) (\w+)(?: final)?(?: :[^:].*)? *\{)");
+    std::vector<std::string> types, spaces;
+    std::istringstream lines(text);
+    std::smatch found;
+    for (std::string line; std::getline(lines, line);) {
+        if (std::regex_search(line, found, opens))
+            spaces.push_back(found[1]);
+        else if (std::regex_search(line, closes) && !spaces.empty())
+            spaces.pop_back();
+        else if (std::regex_search(line, found, type) && std::ranges::find(spaces, "") == spaces.end()) {
+            std::string name;
+            for (const std::string& space : spaces) name += space + "::";
+            types.push_back(name + found[1].str());
+        }
+    }
+    return types;
+}
+
+TEST(Types, AreFoundWhereTheyAreDefined) {
+    EXPECT_EQ(typesIn("namespace vcp {\nstruct A;\nstruct B final : C {\n    struct Inner {\n    };\n};\n"
+                      "namespace {\nclass D {};\n}  // namespace\nenum class E : int { F };\n}  // namespace vcp\n"),
+              (std::vector<std::string>{"vcp::B", "vcp::E"}));
+}
+
+/// Programs link all rooms: of two types with one name, functions of one would be taken for the other's.
+TEST(Types, HaveNamesOfTheirOwn) {
+    std::map<std::string, fs::path> known;
+    for (const std::string& top : topFolders())
+        for (const fs::path& file : sourceFiles(kRoot / top))
+            for (const std::string& type : typesIn(readText(file))) {
+                if (type.find("::") == std::string::npos) continue;  // of a shader
+                const auto [other, isNew] = known.emplace(type, file);
+                EXPECT_TRUE(isNew) << type << " is in " << fs::relative(other->second, kRoot) << " and "
+                                   << fs::relative(file, kRoot);
+            }
+    EXPECT_GT(known.size(), 500u);
 }
 
 /// The renderer stands on all of its room: what lies below it does not know it.

@@ -29,7 +29,7 @@ void dropUnusedPoints(PolygonMesh& mesh) {
 
 class PageWalk {
 public:
-    PageWalk(const SurfaceCut& cut, const PageView& view, PageSurface& out)
+    PageWalk(const SurfaceCut& cut, const PageView& view, ExportedPage& out)
         : cut_(cut), view_(view), out_(out), origin_(cut.originOf(out.page)), shift_(cut.shiftOf(out.page)) {}
 
     void run() {
@@ -120,7 +120,7 @@ private:
 
     const SurfaceCut& cut_;
     const PageView& view_;
-    PageSurface& out_;
+    ExportedPage& out_;
     LatticePoint origin_;
     uint32_t shift_;
     PolygonError error_;
@@ -128,10 +128,10 @@ private:
 
 }  // namespace
 
-Result<PageSurface> readPageSurface(const ByteReader& reader, const SurfaceCut& cut, uint64_t page, bool withColour) {
+Result<ExportedPage> readPageSurface(const ByteReader& reader, const SurfaceCut& cut, uint64_t page, bool withColour) {
     VCP_TRY_ASSIGN(const auto bytes, readPage(reader, cut.dataset(), page, withColour && cut.dataset().hasColour()));
     const PageView view = viewOfChecked(bytes.geometryBytes(), bytes.colourBytes());
-    PageSurface surface;
+    ExportedPage surface;
     surface.page = page;
     PageWalk(cut, view, surface).run();
     return surface;

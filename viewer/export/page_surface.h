@@ -18,7 +18,7 @@ inline constexpr uint64_t kNoPage = UINT64_MAX;
 /// The whole triangles are those of the mesh, or of its level, all of whose corners have a home: a page has each that
 /// touches it. What else the page holds, it holds alone: polygons of leaves, and triangles cut off at its walls. Box
 /// and plane of the cut are those of `wants`: triangles outside are left out.
-struct PageSurface {
+struct ExportedPage {
     uint64_t page = 0;
     std::vector<LatticePoint> points;
     std::vector<uint32_t> colours;  ///< RGBA8, of the points; empty without colour
@@ -35,6 +35,6 @@ struct PageSurface {
 
 /// Reads and checks a page of the cut, and makes its triangles. Memory: some 200 bytes a triangle. Any thread. Errors:
 /// those of readPage.
-Result<PageSurface> readPageSurface(const ByteReader& reader, const SurfaceCut& cut, uint64_t page, bool withColour);
+Result<ExportedPage> readPageSurface(const ByteReader& reader, const SurfaceCut& cut, uint64_t page, bool withColour);
 
 }  // namespace vcp

@@ -41,7 +41,7 @@ struct PageNumbers {
     SharedTable shared = {};          ///< sorted
 };
 
-PageNumbers numbersOf(const PageSurface& surface) {
+PageNumbers numbersOf(const ExportedPage& surface) {
     PageNumbers numbers{.rank = std::vector<uint32_t>(surface.points.size(), kNoRank)};
     const auto isOwn = [&](uint32_t v) { return surface.homes[v] == surface.page; };
     for (const Index3& t : surface.whole)
