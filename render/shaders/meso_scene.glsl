@@ -4,6 +4,13 @@
 uint scenePlane() { return view.width * view.height; }
 #include "render/shaders/scene_planes.glsl"
 
+// Returns a pixel's width at a depth, world units.
+float widthAt(uvec2 pixel, float depth) {
+    vec2 at = vec2(pixel) + 0.5;
+    vec3 towards = view.forward.xyz + at.x * view.forwardX.xyz + at.y * view.forwardY.xyz;
+    return length(view.eyeX.xyz) + length(view.forwardX.xyz) / length(towards) * depth;
+}
+
 // Bits of a light in a plane of light: the one light has all eight.
 uint lightBits(uint number) { return view.lightCount == 1u ? 255u : 1u << number; }
 

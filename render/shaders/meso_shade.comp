@@ -12,24 +12,6 @@ uint fetchHit(uint i) { return hits[i]; }
 #include "render/shared/meso_light.h"
 #include "render/shaders/meso_scene.glsl"
 
-// Returns how much sky is seen, averaged over the pixels around that show the same surface (sceneSkyAbout of
-// shade.comp).
-float skyAbout(uvec2 pixel, float depth) {
-    vec2 at = vec2(pixel) + 0.5;
-    vec3 towards = view.forward.xyz + at.x * view.forwardX.xyz + at.y * view.forwardY.xyz;
-    float reach = 8.0 * (length(view.eyeX.xyz) + length(view.forwardX.xyz) / length(towards) * depth);
-    float sum = 0.0, count = 0.0;
-    for (int i = 0; i < 16; i++) {
-        ivec2 size = ivec2(view.width, view.height);
-        ivec2 p = clamp(ivec2(pixel) + ivec2((i & 3) - 1, (i >> 2) - 1), ivec2(0), size - 1);
-        uint index = uint(p.y) * view.width + uint(p.x);
-        bool same = abs(uintBitsToFloat(hits[index]) - depth) <= reach;
-        sum += same ? unpackUnorm4x8(sceneLight[sceneAt(kSceneLight, index)]).y : 0.0;
-        count += same ? 1.0 : 0.0;
-    }
-    return sum / max(count, 1.0);
-}
-
 void main() {
     uvec2 pixel = gl_GlobalInvocationID.xy;
     if (pixel.x >= view.width || pixel.y >= view.height) return;
@@ -56,7 +38,9 @@ void main() {
             uint seen = sceneLight[sceneAt(kSceneLight, index)];
             for (uint i = 0u; i < view.lightCount; i++)
                 if ((seen & lightBits(i)) == 0u) light[i] = 0.0;
-            if (ray.occlusionRays > 0u) skySeen = skyAbout(pixel, uintBitsToFloat(hits[index]));
+            float depth = sceneDepth(index);
+            if (ray.occlusionRays > 0u)
+                skySeen = sceneSkyAbout(pixel, uvec2(view.width, view.height), depth, 8.0 * widthAt(pixel, depth));
         }
         result *= mesoLight(n, look.w, light, skySeen);
     }

@@ -22,24 +22,6 @@ uint fetchHit(uint i) { return hits[i]; }
 #include "render/shared/hit_light.h"
 #include "render/shaders/meso_scene.glsl"
 
-// Finds which of the lights do not reach a hit.
-void castShadows(uint index, vec3 from, vec3 n) {
-    uint plane = view.width * view.height, at = kMesoPlaneLight * plane + index, light = hits[at];
-    bool isFar = unpackUnorm4x8(hits[kMesoPlaneLook * plane + index]).w < 1.0;
-    for (uint i = 0u; i < view.lightCount; i++) {
-        // Only mesostructure that is not yet in the dark casts a shadow ray.
-        vec3 towards = view.lights[i].xyz;
-        if ((light >> 8u * i & 255u) == 0u || (!isFar && dot(n, towards) <= 0.0)) continue;
-        ShellKept kept = keptPart(from, towards);
-        float reach = kept.last - kept.first;
-        if (reach <= 0.0) continue;
-        ShellHit hit = castShell(from + kept.first * towards, towards, reach);
-        if (hit.unresolved) atomicAdd(counters[0], 1u);
-        if (hit.t < reach) light &= ~(255u << 8u * i);
-    }
-    hits[at] = light;
-}
-
 // Returns where a ray of light is stopped, within `reach`; else `reach`.
 float castLight(vec3 from, vec3 direction, float reach) {
     ShellKept kept = keptPart(from, direction);
@@ -48,6 +30,19 @@ float castLight(vec3 from, vec3 direction, float reach) {
     ShellHit hit = castShell(from + kept.first * direction, direction, left);
     if (hit.unresolved) atomicAdd(counters[0], 1u);
     return hit.t < left ? kept.first + hit.t : reach;
+}
+
+// Finds which of the lights do not reach a hit.
+void castShadows(uint index, vec3 from, vec3 n) {
+    uint plane = view.width * view.height, at = kMesoPlaneLight * plane + index, light = hits[at];
+    bool isFar = unpackUnorm4x8(hits[kMesoPlaneLook * plane + index]).w < 1.0;
+    for (uint i = 0u; i < view.lightCount; i++) {
+        // Only mesostructure that is not yet in the dark casts a shadow ray.
+        vec3 towards = view.lights[i].xyz;
+        if ((light >> 8u * i & 255u) == 0u || (!isFar && dot(n, towards) <= 0.0)) continue;
+        if (castLight(from, towards, kMesoNoHit) < kMesoNoHit) light &= ~(255u << 8u * i);
+    }
+    hits[at] = light;
 }
 
 // Casts `ray` from the place that a pixel shows.

@@ -30,8 +30,5 @@ void main() {
     hits[kMesoPlaneIterations * plane + index] += 1u;
     if (kScene == 0u) return;
     // Triangles are as large as pixels: rays of light begin half a pixel above them.
-    vec2 at = vec2(pixel) + 0.5;
-    vec3 towards = view.forward.xyz + at.x * view.forwardX.xyz + at.y * view.forwardY.xyz;
-    float width = length(view.eyeX.xyz) + length(view.forwardX.xyz) / length(towards) * hit.x;
-    keepInScene(index, hit.x, code, max(view.shadowLift, 0.5 * width), false);
+    keepInScene(index, hit.x, code, max(view.shadowLift, 0.5 * widthAt(pixel, hit.x)), false);
 }

@@ -7,4 +7,3 @@ layout(set = 0, binding = 20, std430) buffer SceneLightBlock { uint sceneLight[]
 
 uint scenePlane() { return frame.width * frame.height; }
 #include "render/shaders/scene_planes.glsl"
-float sceneDepth(uint pixel) { return uintBitsToFloat(targetDepths[pixel]); }

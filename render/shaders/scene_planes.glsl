@@ -1,7 +1,23 @@
 // The planes of light of a picture in which several things shade each other (frame_layout.h, kSceneNormal). Whoever
-// includes it gives sceneLight, the buffer; scenePlane(), the words of a plane; and hit_light.h.
+// includes it gives sceneLight and targetDepths, the buffers; scenePlane(), the words of a plane; and hit_light.h.
 
 uint sceneAt(uint plane, uint pixel) { return plane * scenePlane() + pixel; }
+
+float sceneDepth(uint pixel) { return uintBitsToFloat(targetDepths[pixel]); }
+
+// Returns how much sky is seen, averaged over the pixels around that are no farther than `reach` from a depth: each
+// pixel of a square of 4 x 4 has directions of its own. `size`: of the picture.
+float sceneSkyAbout(uvec2 pixel, uvec2 size, float depth, float reach) {
+    float sum = 0.0, count = 0.0;
+    for (int i = 0; i < 16; i++) {
+        ivec2 p = clamp(ivec2(pixel) + ivec2((i & 3) - 1, (i >> 2) - 1), ivec2(0), ivec2(size) - 1);
+        uint at = uint(p.y) * size.x + uint(p.x);
+        bool same = abs(sceneDepth(at) - depth) <= reach;
+        sum += same ? unpackUnorm4x8(sceneLight[sceneAt(kSceneLight, at)]).y : 0.0;
+        count += same ? 1.0 : 0.0;
+    }
+    return sum / max(count, 1.0);
+}
 
 // Returns the light of a pixel before a light's ray: the first of all rays finds everything lit.
 uint lightBefore(uint pixel, bool isFirstOfAll) {

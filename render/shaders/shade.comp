@@ -33,20 +33,6 @@ float skyAbout(uvec2 pixel, float depth, uint plane) {
     return sum / max(count, 1.0);
 }
 
-// Returns the same in a picture of several datasets.
-float sceneSkyAbout(uvec2 pixel, float depth) {
-    float reach = 8.0 * pixelEdgeAt(depth / frame.worldPerCell) * frame.worldPerCell;
-    float sum = 0.0, count = 0.0;
-    for (int i = 0; i < 16; i++) {
-        ivec2 p = clamp(ivec2(pixel) + ivec2((i & 3) - 1, (i >> 2) - 1), ivec2(0), ivec2(pictureSize()) - 1);
-        uint at = uint(p.y) * frame.width + uint(p.x);
-        bool same = abs(sceneDepth(at) - depth) <= reach;
-        sum += same ? unpackUnorm4x8(sceneLight[sceneAt(kSceneLight, at)]).y : 0.0;
-        count += same ? 1.0 : 0.0;
-    }
-    return sum / max(count, 1.0);
-}
-
 // Returns the light of all that is seen of them.
 float sunlightOfAll(vec3 n, uint seen) {
     float sum = sunlightOf(n, frame.lightDirection.xyz, float(seen & 1u));
@@ -114,7 +100,8 @@ void main() {
     if (kLight == 2u) {
         if (depth * frame.worldPerCell != sceneDepth(at)) return;
         if (frame.hasShadows != 0u) seen = sceneLight[sceneAt(kSceneLight, at)] & 255u;
-        if (frame.occlusionRays > 0u) skySeen = sceneSkyAbout(pixel, sceneDepth(at));
+        float reach = 8.0 * pixelEdgeAt(sceneDepth(at) / frame.worldPerCell) * frame.worldPerCell;
+        if (frame.occlusionRays > 0u) skySeen = sceneSkyAbout(pixel, pictureSize(), sceneDepth(at), reach);
     }
     vec3 colour = frame.shadingMode == kShadeNormals ? turnedBy(frame.rotation.xyz, frame.rotation.w, n) * 0.5 + 0.5
                   : frame.shadingMode == kShadeUnlit ? albedo

@@ -233,10 +233,11 @@ struct Renderer::View {
     void record(VkCommandBuffer commands, Frame& frame, const FrameStep& step, TileRange tiles);
     void recordBeam(VkCommandBuffer commands, Frame& frame, size_t layer);
     void recordShade(VkCommandBuffer commands, Frame& frame, size_t layer);
-    /// Records the surfaces, over the datasets' picture.
+    /// Returns what the surfaces are drawn over.
     [[nodiscard]] static MesoSurfacePass::Picture underSurfaces(const Frame& frame);
     void recordSurfaceHits(VkCommandBuffer commands, const Frame& frame) const;
     void recordSurfaceRay(VkCommandBuffer commands, const Frame& frame, const frame::SceneRay& ray) const;
+    /// Records the surfaces, over the datasets' picture; where they shade each other, what is left of them.
     Result<void> recordSurfaces(VkCommandBuffer commands, Frame& frame);
 
     /// Takes in frames that have ended, in their order. Never waits. Errors: Device.
