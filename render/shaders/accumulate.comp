@@ -5,13 +5,11 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #include "render/shaders/bindings.glsl"
+#include "render/shaders/tiles.glsl"
+#include "render/shaders/sums.glsl"
 #include "render/shared/hit_light.h"
 
 layout(local_size_x = 8, local_size_y = 8) in;
-
-layout(set = 0, binding = 13, std430) readonly buffer PartPictureBlock { uint partPixels[]; };
-layout(set = 0, binding = 18, std430) buffer SumBlock { vec4 sums[]; };
-layout(set = 0, binding = 19, std430) buffer ShownPictureBlock { uint shownPixels[]; };
 
 vec4 seenLight(uint word) {
     vec4 colour = unpackUnorm4x8(word);
@@ -19,12 +17,12 @@ vec4 seenLight(uint word) {
 }
 
 void main() {
-    uvec2 pixel = gl_GlobalInvocationID.xy;
+    uvec2 pixel = ownPlace();
     if (pixel.x >= frame.width || pixel.y >= frame.partRows) return;
     uint at = (pixel.y + frame.partRow) * frame.width + pixel.x;
-    vec4 before = frame.sampleNumber == 1u ? seenLight(shownPixels[at]) : sums[at];
-    vec4 sum = before + seenLight(partPixels[(pixel.y + frame.skippedRows) * frame.width + pixel.x]);
-    sums[at] = sum;
-    shownPixels[at] =
-        packUnorm4x8(vec4(colourOfLight(sum.rgb / max(sum.a, 1.0)), sum.a / float(frame.sampleNumber + 1u)));
+    vec4 before = frame.sampleNumber == 1u ? seenLight(fetchShown(at)) : fetchSum(at);
+    vec4 sum = before + seenLight(fetchPart((pixel.y + frame.skippedRows) * frame.width + pixel.x));
+    storeSum(at, sum);
+    storeShown(at,
+               packUnorm4x8(vec4(colourOfLight(sum.rgb / max(sum.a, 1.0)), sum.a / float(frame.sampleNumber + 1u))));
 }

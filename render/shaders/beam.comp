@@ -9,6 +9,7 @@
 #extension GL_GOOGLE_include_directive : require
 #include "render/shaders/bindings.glsl"
 #include "render/shaders/rays.glsl"
+#include "render/shaders/tiles.glsl"
 
 layout(constant_id = 7) const uint kBeam = 1u;  // 0: every tile is listed, from distance 0
 layout(local_size_x = 8, local_size_y = 8) in;
@@ -174,18 +175,12 @@ float tileStart(Bundle bundle) {
 }
 
 void main() {
-    uvec2 tile = gl_GlobalInvocationID.xy;
+    uvec2 tile = ownPlace();
     if (any(greaterThanEqual(tile, uvec2(frame.tilesX, frame.tilesY)))) return;
     float start = 0.0;
     if (kBeam != 0u) {
         start = tileStart(tileBundle(tile));
         if (start < kTileEmpty) start = max(0.0, start * (1.0 - 2e-6) - 2e-3);
     }
-    uint number = tile.y * frame.tilesX + tile.x;
-    tileStarts[number] = floatBitsToUint(start);
-    if (start < kTileEmpty) {
-        uint at = atomicAdd(tileList[3], 1u);
-        tileList[kTileListHeader + at] = tile.y << 16 | tile.x;
-        if (at % kTileRow == 0u) atomicAdd(tileList[1], 1u);
-    }
+    storeTileStart(tile, start);
 }

@@ -1,28 +1,14 @@
 // The one descriptor set of all passes, and the one way to read pages and tables: fetchTexel and its like.
 // Read-only data is bound twice, as texel buffers (the fast path of software devices, whose storage
-// buffer loads are scalar loops) and as storage buffers; kTexelAccess chooses.
+// buffer loads are scalar loops) and as storage buffers; kTexelAccess chooses. Browsers have a file of this name of
+// their own (viewer/web/shaders).
 #extension GL_EXT_control_flow_attributes : require
-#define INLINE
 #define DONT_UNROLL [[dont_unroll]]
-#define ROOT_RESIDUAL 1e-5
-#define Real float
-#define Real2 vec2
-#define Real3 vec3
-#define Real4 vec4
-#define uint4 uvec4
-#include "octree/shared/page_layout.h"
-#include "render/shared/frame_layout.h"
+#include "render/shaders/words.glsl"
 
 layout(constant_id = 0) const uint kTexelAccess = 1u;
 layout(constant_id = 1) const uint kPoolChunks = 1u;
 layout(constant_id = 2) const uint kChunkShift = 26u;  // log2 of 16-byte texels a chunk
-// 1: vertices and cells have some; 2: triangles may have images, too; 3: and channels of their materials are shown
-layout(constant_id = 3) const uint kColour = 0u;
-layout(constant_id = 4) const uint kCountSteps = 0u;
-layout(constant_id = 5) const uint kFalseColour = 0u;
-// 1: pages of different levels may leave gaps between them; 0: the surface of each page covers the mesh's within it
-layout(constant_id = 6) const uint kSeams = 0u;
-
 // clang-format off
 layout(set = 0, binding = 0, std140) uniform FrameBlock { FrameConstants frame; };
 layout(set = 0, binding = 1) uniform utextureBuffer poolTexels[kMaxPoolChunks];
@@ -47,16 +33,6 @@ layout(set = 0, binding = 14, std430) buffer CounterBlock { FrameCounters counte
 layout(set = 0, binding = 15, std430) buffer FeedbackBlock { uint feedback[]; };
 layout(set = 0, binding = 21, std430) readonly buffer ImageBlock { uint imageWords[]; };  // images.glsl
 // clang-format on
-
-// A light as FrameConstants::lightDirection has it, and its bits of the part of the light that is seen: the one light
-// has all eight.
-vec4 lightNumbered(uint number) { return number == 0u ? frame.lightDirection : frame.moreLights[number - 1u]; }
-uint bitsOfLight(uint number) { return frame.lightCount == 1u ? 255u : 1u << number; }
-
-uvec2 pictureSize() { return uvec2(frame.width, frame.height); }
-
-// Returns a pixel's edge at a depth, in finest cells.
-float pixelEdgeAt(float depth) { return frame.pixelEdge + frame.pixelEdgePerDepth * depth; }
 
 // Chunks are few and their number is known to the compiler: with one there is no choice to make.
 #define FETCH_CHUNK(texelsName, blockName, i) \
@@ -92,29 +68,6 @@ uvec4 fetchTable(uint texel) {
     return kTexelAccess == 1u ? texelFetch(tableTexels, int(texel)) : tableBlock.texels[texel];
 }
 
-// The parts of record `number` of the page table.
-TableNode fetchTableNode(uint number) {
-    uvec4 t = fetchTable(number * kRecordTexels);
-    return TableNode(t.x, t.y, t.z, t.w);
-}
-
-TableSections fetchTableSections(uint number) {
-    uvec4 t = fetchTable(number * kRecordTexels + 1u);
-    return TableSections(t.x, t.y, t.z, t.w);
-}
-
-TableColours fetchTableColours(uint number) {
-    uvec4 t = fetchTable(number * kRecordTexels + 2u);
-    return TableColours(t.x, t.y, t.z, t.w);
-}
-
-bool hasOctant(TableNode record, uint octant) { return (record.flags >> octant & 1u) != 0u; }
-
-// Number in the table of the child in an octant that has one.
-uint childIn(TableNode record, uint octant) {
-    return record.firstChild + bitCount(record.flags & ((1u << octant) - 1u));
-}
-
 float fetchTileStart(uint tile) {
     return uintBitsToFloat(kTexelAccess == 1u ? texelFetch(tileStartTexels, int(tile)).x : tileStarts[tile]);
 }
@@ -122,13 +75,6 @@ float fetchTileStart(uint tile) {
 uint fetchTileList(uint i) { return kTexelAccess == 1u ? texelFetch(tileListTexels, int(i)).x : tileList[i]; }
 
 uint fetchHit(uint i) { return kTexelAccess == 1u ? texelFetch(hitTexels, int(i)).x : hits[i]; }
-
-// Word `i` of a texel.
-uint texelWord(uvec4 texel, uint i) {
-    uint lo = (i & 1u) == 0u ? texel.x : texel.y;
-    uint hi = (i & 1u) == 0u ? texel.z : texel.w;
-    return (i & 2u) == 0u ? lo : hi;
-}
 
 // One word of the pool: word `i` of the texels from `texel` on. Storage buffers need not read the other three.
 uint fetchWord(uint texel, uint i) {
@@ -145,8 +91,23 @@ uint fetchWord(uint texel, uint i) {
     return poolWordBlock[7].words[offset];
 }
 
-// The two words of a record of 8 bytes.
-uvec2 fetchPair(uint sectionTexel, uint i) {
-    uvec4 texel = fetchTexel(sectionTexel + (i >> 1));
-    return (i & 1u) == 0u ? texel.xy : texel.zw;
+uint fetchImageWord(uint i) { return imageWords[i]; }
+
+// Word `i` of the planes of hits.
+void storeHit(uint i, uint word) { hits[i] = word; }
+
+void storePicture(uint pixel, uint colour) { picturePixels[pixel] = colour; }
+
+// The start of a tile, which is listed where it is not empty.
+void storeTileStart(uvec2 tile, float start) {
+    tileStarts[tile.y * frame.tilesX + tile.x] = floatBitsToUint(start);
+    if (start >= kTileEmpty) return;
+    uint at = atomicAdd(tileList[3], 1u);
+    tileList[kTileListHeader + at] = tile.y << 16 | tile.x;
+    if (at % kTileRow == 0u) atomicAdd(tileList[1], 1u);
 }
+
+// Notes that rays of a kind hit a page, or begin in it. Precondition: marks are asked for.
+void storeMark(uint record, uint kind) { feedback[frame.firstHitMark + 2u * record + kind] = 1u; }
+
+#include "render/shaders/frame_reads.glsl"

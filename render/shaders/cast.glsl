@@ -273,7 +273,7 @@ float castPage(Ray ray, Page page, float s, float until, inout Hit hit, inout Wo
 void markPage(uint record, bool isMet) {
     bool marks = isMet && frame.firstHitMark != 0u;
     while (marks) {
-        feedback[frame.firstHitMark + 2u * record + kHitBy] = 1u;
+        storeMark(record, kHitBy);
         marks = false;
     }
 }

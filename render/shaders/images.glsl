@@ -19,7 +19,7 @@
 #undef SELECT
 
 uvec4 imageRecord(uint word) {
-    return uvec4(imageWords[word], imageWords[word + 1u], imageWords[word + 2u], imageWords[word + 3u]);
+    return uvec4(fetchImageWord(word), fetchImageWord(word + 1u), fetchImageWord(word + 2u), fetchImageWord(word + 3u));
 }
 
 // A vertex of a triangle in an image: coordinates in steps, 2^kLog2TextureSteps across it, and the material plus 1; 0:
@@ -84,7 +84,7 @@ vec4 weightedTexel(uint word, float weight, bool ofNumbers) {
 // Returns the word of the texels of the tile that has a texel of a level; 0 where it is not here.
 uint tileOf(uvec4 level, ivec2 texel) {
     uint tilesX = (level.x + (1u << level.w) - 1u) >> level.w;
-    return imageWords[level.z + (uint(texel.y) >> level.w) * tilesX + (uint(texel.x) >> level.w)];
+    return fetchImageWord(level.z + (uint(texel.y) >> level.w) * tilesX + (uint(texel.x) >> level.w));
 }
 
 // Returns a texel that is in such a tile.
@@ -92,7 +92,7 @@ uint texelOf(uvec4 level, uint tile, ivec2 texel) {
     uint edge = 1u << level.w;
     uint before = uint(texel.x) & ~(edge - 1u);
     uint width = min(edge, level.x - before);
-    return imageWords[tile + (uint(texel.y) & (edge - 1u)) * width + uint(texel.x) - before];
+    return fetchImageWord(tile + (uint(texel.y) & (edge - 1u)) * width + uint(texel.x) - before);
 }
 
 // Returns what a level shows at a point, between four texels, times a weight; nothing where not all of them are here.

@@ -289,7 +289,7 @@ vec4 triangleColour(Hit hit, vec3 a, vec3 b, vec3 c, vec3 n, uint colourVertices
         uint vertices = fetchWord(record.pageTexel, kPageHeaderVertices);
         ImagePoint first = fetchImagePoint(colourVertices, vertices, hit.corners.x);
         bool hasImage =
-            first.material != 0u && first.material <= imageWords[0] && imageRecord(4u * first.material).x != 0u;
+            first.material != 0u && first.material <= fetchImageWord(0u) && imageRecord(4u * first.material).x != 0u;
         while (hasImage) {
             ImagedTriangle t = imagedTriangle(first, fetchImagePoint(colourVertices, vertices, hit.corners.y),
                                               fetchImagePoint(colourVertices, vertices, hit.corners.z));

@@ -47,5 +47,5 @@ void main() {
         if (!isSun) open += blocked ? skyBehind(hit.depth / radius) : 1.0;
     }
     float skyLight = sky == 0u ? 1.0 : open / float(sky);
-    if (found) hits[frame.lightPlane * plane + at] = packUnorm4x8(vec4(0.0, skyLight, 0.0, 0.0)) | seen;
+    if (found) storeHit(frame.lightPlane * plane + at, packUnorm4x8(vec4(0.0, skyLight, 0.0, 0.0)) | seen);
 }

@@ -6,6 +6,7 @@
 #include "render/shaders/bindings.glsl"
 #include "render/shaders/rays.glsl"
 #include "render/shaders/tiles.glsl"
+#include "render/shaders/counts.glsl"
 #include "render/shaders/sections.glsl"
 #include "render/shaders/hit_records.glsl"
 #include "render/shared/hit_light.h"
@@ -46,14 +47,10 @@ void main() {
     hit.normal -= max(dot(hit.normal, ray.direction), 0.0) * ray.direction;
     uint at = pixel.y * frame.width + pixel.x;
     uint plane = frame.width * frame.height;
-    hits[at] = floatBitsToUint(hit.depth);
-    hits[plane + at] = packHitNormal(hit.normal);
-    if (kFalseColour != 0u) hits[frame.lightPlane * plane + at] = floatBitsToUint(falseColour(hit, work, page));
+    storeHit(at, floatBitsToUint(hit.depth));
+    storeHit(plane + at, packHitNormal(hit.normal));
+    if (kFalseColour != 0u) storeHit(frame.lightPlane * plane + at, floatBitsToUint(falseColour(hit, work, page)));
 
-    uint hitCount = subgroupBallotBitCount(subgroupBallot(found));
-    if (subgroupElect()) atomicAdd(counters.hitPixels, hitCount);
-    if (kCountSteps != 0u) {
-        atomicAdd(counters.steps, work.steps);
-        atomicAdd(counters.fetches, work.fetches);
-    }
+    countHit(found);
+    if (kCountSteps != 0u) countWork(work.steps, work.fetches);
 }

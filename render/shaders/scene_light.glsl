@@ -7,3 +7,8 @@ layout(set = 0, binding = 20, std430) buffer SceneLightBlock { uint sceneLight[]
 
 uint scenePlane() { return frame.width * frame.height; }
 #include "render/shaders/scene_planes.glsl"
+
+// Light of all datasets at a pixel, as the hits' plane of light.
+uint sceneLightAt(uint pixel) { return sceneLight[sceneAt(kSceneLight, pixel)]; }
+
+void storeScenePicture(uint pixel, uint colour) { targetPixels[pixel] = colour; }

@@ -83,7 +83,7 @@ void main() {
     bool wired = kFalseColour != 0u && frame.shadingMode == kShadeWireframe;
     if (kFalseColour != 0u && !wired) {
         float value = uintBitsToFloat(fetchHit(frame.lightPlane * plane + at));
-        picturePixels[at] = packUnorm4x8(vec4(heat(value), 1.0));
+        storePicture(at, packUnorm4x8(vec4(heat(value), 1.0)));
         return;
     }
     vec3 n = unpackHitNormal(fetchHit(plane + at));
@@ -99,7 +99,7 @@ void main() {
     }
     if (kLight == 2u) {
         if (depth * frame.worldPerCell != sceneDepth(at)) return;
-        if (frame.hasShadows != 0u) seen = sceneLight[sceneAt(kSceneLight, at)] & 255u;
+        if (frame.hasShadows != 0u) seen = sceneLightAt(at) & 255u;
         float reach = 8.0 * pixelEdgeAt(sceneDepth(at) / frame.worldPerCell) * frame.worldPerCell;
         if (frame.occlusionRays > 0u) skySeen = sceneSkyAbout(pixel, pictureSize(), sceneDepth(at), reach);
     }
@@ -122,7 +122,7 @@ void main() {
         colour = mix(colour, line < 0.0 ? leafInk() : triangleInk(), abs(line));
     }
     if (kLight == 2u)
-        targetPixels[at] = packUnorm4x8(vec4(colour, 1.0));
+        storeScenePicture(at, packUnorm4x8(vec4(colour, 1.0)));
     else
-        picturePixels[at] = packUnorm4x8(vec4(colour, 1.0));
+        storePicture(at, packUnorm4x8(vec4(colour, 1.0)));
 }

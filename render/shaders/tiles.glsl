@@ -18,6 +18,9 @@ uint stripedIndex(uint i, uint count) {
     return i < run * stripes ? (i - stripe * run) * stripes + stripe : i;
 }
 
+// The place of an invocation in a grid over all tiles, or all pixels; the grid may be larger.
+uvec2 ownPlace() { return gl_GlobalInvocationID.xy; }
+
 // Finds the invocation's pixel among those of all tiles; false where there is none.
 bool anyPixel(out uvec2 pixel) {
     uint index = gl_WorkGroupID.y * kTileRow + gl_WorkGroupID.x;

@@ -7,6 +7,7 @@
 #include "render/shaders/bindings.glsl"
 #include "render/shaders/rays.glsl"
 #include "render/shaders/tiles.glsl"
+#include "render/shaders/counts.glsl"
 const uint kHitBy = kHitByCamera;
 #include "render/shaders/cast.glsl"
 #include "render/shaders/sections.glsl"
@@ -204,16 +205,16 @@ void main() {
     vec3 normal = unit - max(dot(unit, ray.direction), 0.0) * ray.direction;
     uint at = pixel.y * frame.width + pixel.x;
     uint plane = frame.width * frame.height;
-    hits[at] = floatBitsToUint(onCap ? -hit.depth : hit.depth);
-    hits[plane + at] = packHitNormal(normal);
-    if (kColour != 0u) hits[2u * plane + at] = packUnorm4x8(surface.colour);
+    storeHit(at, floatBitsToUint(onCap ? -hit.depth : hit.depth));
+    storeHit(plane + at, packHitNormal(normal));
+    if (kColour != 0u) storeHit(2u * plane + at, packUnorm4x8(surface.colour));
     if (kColour == 3u) {
         HitChannels c = HitChannels(false, normal, 0.0, 0.0, vec3(0.0));
         if (!onCap) c = channelsAt(hit, normal, ray.direction);
         uint behind = frame.lightPlane + 1u;
-        hits[behind * plane + at] = packHitNormal(c.normal);
-        hits[(behind + 1u) * plane + at] = packHitSurface(c.areThere, c.roughness, c.metalness);
-        hits[(behind + 2u) * plane + at] = packUnorm4x8(vec4(colourOfLight(c.emission), 0.0));
+        storeHit(behind * plane + at, packHitNormal(c.normal));
+        storeHit((behind + 1u) * plane + at, packHitSurface(c.areThere, c.roughness, c.metalness));
+        storeHit((behind + 2u) * plane + at, packUnorm4x8(vec4(colourOfLight(c.emission), 0.0)));
     }
     if (kFalseColour != 0u) {
         float shown = falseColour(hit, work);
@@ -222,13 +223,9 @@ void main() {
             shown = onCap ? 0.0 : lineOf(hit, unit, ray.direction);
             wired = false;
         }
-        hits[frame.lightPlane * plane + at] = floatBitsToUint(shown);
+        storeHit(frame.lightPlane * plane + at, floatBitsToUint(shown));
     }
 
-    uint hitCount = subgroupBallotBitCount(subgroupBallot(found));
-    if (subgroupElect()) atomicAdd(counters.hitPixels, hitCount);
-    if (kCountSteps != 0u) {
-        atomicAdd(counters.steps, work.steps);
-        atomicAdd(counters.fetches, work.steps + work.fetches);
-    }
+    countHit(found);
+    if (kCountSteps != 0u) countWork(work.steps, work.steps + work.fetches);
 }
