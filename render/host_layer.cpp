@@ -67,10 +67,19 @@ std::vector<uint64_t> CutScene::marked(const PageMarks& marks) const {
     return pages;
 }
 
-RayFeedback feedbackOf(const HostLayer& layer, const Dataset& dataset, const HostPicture& picture, RowsOfWhole rows) {
-    RayFeedback feedback;
+void addTo(RayFeedback& feedback, const Dataset& dataset, const PictureRays& rays, const ProbedHit& hit) {
     const glm::dvec3 origin = dataset.originOf(dataset.pages[0]);
     const double rootEdge = dataset.edgeOf(dataset.pages[0]), unit = std::ldexp(rootEdge, -int(frame::kLatticeBits));
+    const glm::dvec3 from = rays.originAt(hit.point.x, hit.point.y);
+    const glm::dvec3 along = glm::normalize(rays.directionAt(hit.point.x, hit.point.y));
+    const glm::dvec3 place = (from + hit.depth * along - origin) / unit;
+    constexpr double kLast = double((uint32_t{1} << frame::kLatticeBits) - 1);
+    feedback.hits.push_back({hit.page, glm::ivec3(glm::clamp(place, 0.0, kLast)), hit.ray});
+    feedback.passed.push_back({hit.page, frame::kNearnessEps / (hit.depth / rootEdge + frame::kNearnessEps)});
+}
+
+RayFeedback feedbackOf(const HostLayer& layer, const Dataset& dataset, const HostPicture& picture, RowsOfWhole rows) {
+    RayFeedback feedback;
     const glm::dvec2 size(picture.size.x, rows.wholeHeight), grid(frame::kFeedbackWidth, frame::kFeedbackHeight);
     for (uint32_t ray = 0; ray < frame::kFeedbackRays; ++ray) {
         const glm::dvec2 part(ray % frame::kFeedbackWidth, ray / frame::kFeedbackWidth);
@@ -79,14 +88,11 @@ RayFeedback feedbackOf(const HostLayer& layer, const Dataset& dataset, const Hos
         pixel.y -= rows.first;
         const size_t at = size_t(pixel.y) * size_t(picture.size.x) + size_t(pixel.x);
         if (picture.hits[at].dataset != layer.number) continue;
-        const glm::dvec3 from = layer.rays.originAt(pixel.x + 0.5, pixel.y + 0.5);
-        const glm::dvec3 along = glm::normalize(layer.rays.directionAt(pixel.x + 0.5, pixel.y + 0.5));
-        const double depth = double(picture.depth[at]) / layer.worldPerUnit;
-        const glm::dvec3 place = (from + depth * along - origin) / unit;
-        const uint64_t page = layer.scene.page(picture.hits[at].page).number;
-        constexpr double kLast = double((uint32_t{1} << frame::kLatticeBits) - 1);
-        feedback.hits.push_back({page, glm::ivec3(glm::clamp(place, 0.0, kLast)), ray});
-        feedback.passed.push_back({page, frame::kNearnessEps / (depth / rootEdge + frame::kNearnessEps)});
+        addTo(feedback, dataset, layer.rays,
+              {.ray = ray,
+               .page = layer.scene.page(picture.hits[at].page).number,
+               .depth = double(picture.depth[at]) / layer.worldPerUnit,
+               .point = glm::dvec2(pixel) + 0.5});
     }
     return feedback;
 }

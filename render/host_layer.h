@@ -50,6 +50,15 @@ struct RowsOfWhole {
     int wholeHeight = 0;
 };
 
+/// A point of a picture that rays hit a page in.
+struct ProbedHit {
+    uint32_t ray = 0;   ///< of the grid over the whole picture
+    uint64_t page = 0;  ///< number in the directory
+    double depth = 0;   ///< along the ray, units of the dataset
+    glm::dvec2 point;   ///< where the ray goes through, pixels of the rays' picture
+};
+void addTo(RayFeedback& feedback, const Dataset& dataset, const PictureRays& rays, const ProbedHit& hit);
+
 /// Returns what those rays of a grid over the whole picture that lie in the rows met of one dataset: the pages that
 /// they hit.
 RayFeedback feedbackOf(const HostLayer& layer, const Dataset& dataset, const HostPicture& picture, RowsOfWhole rows);

@@ -186,4 +186,9 @@ void seeAll(std::vector<SeenPages> seen, ViewNumber number) {
     }
 }
 
+bool showsChannels(const Residency& residency, const FrameRequest& request) {
+    return residency.hasColour() && residency.hasChannels() && request.shading.channels &&
+           request.shading.mode == ShadingMode::Lit;
+}
+
 }  // namespace vcp

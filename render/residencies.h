@@ -93,4 +93,7 @@ struct SeenPages {
 /// they hit then: what they hit counts once those ask for nothing finer in any of them.
 void seeAll(std::vector<SeenPages> seen, ViewNumber number = 0);
 
+/// Whether a picture shows channels of a dataset's materials.
+bool showsChannels(const Residency& residency, const FrameRequest& request);
+
 }  // namespace vcp

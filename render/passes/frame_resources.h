@@ -17,7 +17,7 @@
 //           of their mean
 // 20        normals, lifts and light of   compose,           scene light, shade
 //           all datasets                  scene light
-// 21        images (passes/image_words.h) CPU (upload)       trace with images
+// 21        images (pages/image_words.h)  CPU (upload)       trace with images
 #pragma once
 
 #include <array>
@@ -115,7 +115,7 @@ public:
     void setBackground(std::vector<uint32_t> rows);
     /// Sets the pools; both may be the same. Null: nothing is shown, or nothing has colour.
     void setPools(const PagePool* pages, const PagePool* colours);
-    /// Sets the images of the dataset (image_words.h); null: none are read.
+    /// Sets the images of the dataset (image_buffer.h); null: none are read.
     void setImages(const Buffer* images);
     /// Sets the feedback buffer: not null as long as frames with the feedback pass are drawn.
     void setFeedback(const Buffer* feedback);

@@ -50,7 +50,8 @@ HitChannels channelsAt(Hit hit, vec3 normal, vec3 direction) {
             uint colours = fetchTableColours(hit.record).vertices;
             ImagePoint first = fetchImagePoint(colours, vertices, hit.corners.x);
             uvec4 material = uvec4(0u);
-            if (first.material != 0u && first.material <= fetchImageWord(0u)) material = imageRecord(4u * first.material);
+            if (first.material != 0u && first.material <= fetchImageWord(0u))
+                material = imageRecord(4u * first.material);
             bool hasChannels = material.x != 0u && material.w != 0u;
             while (hasChannels) {
                 uint corners = fetchTableSections(hit.record).vertices;

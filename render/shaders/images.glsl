@@ -1,5 +1,5 @@
 // What the images of a file show on triangles: octree/imaged_triangle.h and octree/image/image_filter.h as shaders read
-// them. The words of the images (render/passes/image_words.h):
+// them. The words of the images (render/pages/image_words.h):
 //
 //   4 words            the number of materials; 0
 //   4 words a material where its image begins, 0 where it is not shown; RGBA8 that multiplies what the image shows; how

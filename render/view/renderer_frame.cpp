@@ -8,6 +8,7 @@
 
 #include "render/false_colours.h"
 #include "render/frame_setup.h"
+#include "render/residencies.h"
 #include "render/view/renderer_view.h"
 #include "render/vulkan/compute_pipeline.h"
 
@@ -23,11 +24,6 @@ constexpr uint64_t kFewestStepRays = 1 << 12;
 
 // Planes of a pixel's record behind the others, where channels of materials are shown.
 constexpr uint32_t kChannelPlanes = 3;
-
-bool showsChannels(const Residency& residency, const FrameRequest& request) {
-    return residency.hasColour() && residency.hasChannels() && request.shading.channels &&
-           request.shading.mode == ShadingMode::Lit;
-}
 
 uint32_t hitPlanesOf(const FrameRequest& request, const PassConstants& constants) {
     return hitPlanes(request, constants.colour) + (constants.channels ? kChannelPlanes : 0);

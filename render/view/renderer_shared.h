@@ -10,7 +10,7 @@
 #include "render/passes/beam.h"
 #include "render/passes/compose.h"
 #include "render/passes/feedback.h"
-#include "render/passes/image_words.h"
+#include "render/passes/image_buffer.h"
 #include "render/passes/light.h"
 #include "render/passes/meso_surface.h"
 #include "render/passes/paper_trace.h"

@@ -1,16 +1,10 @@
-#include "render/passes/image_words.h"
+#include "render/pages/image_words.h"
 
 #include <bit>
-#include <vector>
-
-#include <fmt/format.h>
 
 namespace vcp {
 
 namespace {
-
-// What the tables of images may take beside their texels: those of a million tiles.
-constexpr uint64_t kTableBytes = 4ull << 20;
 
 /// Where the words of images stand: those that all sets of a file share, which the texels follow.
 struct Layout {
@@ -45,10 +39,13 @@ void addChannels(const ChannelRow& row, const Layout& layout, std::vector<uint32
                                bits(row.emissionFactor[1]), bits(row.emissionFactor[2]), 0});
 }
 
-/// Returns the tables (images.glsl), and puts the texels that follow them, tile by tile, into `parts`.
-std::vector<uint32_t> tableWords(const ImageSet& set, std::vector<std::span<const std::byte>>& parts) {
+}  // namespace
+
+ImageWords imageWords(const ImageSet& set) {
     const Layout layout(set);
-    std::vector<uint32_t> words{uint32_t(set.materials().size()), 0, 0, 0};
+    ImageWords made;
+    std::vector<uint32_t>& words = made.tables;
+    words = {uint32_t(set.materials().size()), 0, 0, 0};
     for (size_t i = 0; i < set.materials().size(); ++i) {
         const MaterialRow& material = set.materials()[i];
         words.insert(words.end(),
@@ -69,31 +66,10 @@ std::vector<uint32_t> tableWords(const ImageSet& set, std::vector<std::span<cons
             for (size_t i = 0; i < level.tiles.size(); ++i) {
                 const uint64_t texels = level.tiles[i] ? level.texelsOf(i) : 0;
                 words.push_back(texels > 0 ? uint32_t(end) : 0);
-                if (texels > 0) parts.push_back(std::as_bytes(std::span(level.tiles[i].get(), texels)));
+                if (texels > 0) made.texels.emplace_back(level.tiles[i].get(), texels);
                 end += texels;
             }
-    return words;
-}
-
-}  // namespace
-
-uint64_t mostImageBytes(const Device& device) {
-    const uint64_t most = device.limits().maxStorageBufferRange;
-    return most > kTableBytes ? most - kTableBytes : 0;
-}
-
-Result<Buffer> uploadImages(Device& device, const ImageSet& images) {
-    ImageSet within = images;
-    within.shrinkTo(mostImageBytes(device));
-    std::vector<std::span<const std::byte>> parts(1);
-    const std::vector<uint32_t> tables = tableWords(within, parts);
-    parts.front() = std::as_bytes(std::span(tables));
-    const uint64_t bytes = parts.front().size() + within.bytes(), most = device.limits().maxStorageBufferRange;
-    if (bytes > most)
-        return Error{
-            .code = ErrorCode::Limit,
-            .message = fmt::format("{} bytes of images with their tables; this device reads {} at most", bytes, most)};
-    return device.createFilled(parts, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT);
+    return made;
 }
 
 }  // namespace vcp

@@ -1,4 +1,4 @@
-// The images of a file on the device: the words that shaders/images.glsl reads.
+// The images of a file on the device (render/pages/image_words.h).
 #pragma once
 
 #include "octree/image/image_set.h"
