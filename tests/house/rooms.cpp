@@ -63,6 +63,7 @@ const std::vector<Room>& rooms() {
         {"viewer/web/wasm/system/sys", {}},
         {"viewer/web/wasm/system/tbb", {}},
         {"viewer/web/wasm/system", {}},
+        {"viewer/web/shaders", {"octree/shared", "render", "render/shared"}},
         {"viewer/web/wasm", {"octree/", "streaming", "streaming/shard", "render", "render/host", "render/pages"}},
         {"viewer/window",
          {"octree/", "builder/", "render", "render/host", "streaming", "viewer/annotation", "viewer/camera",

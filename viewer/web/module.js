@@ -188,6 +188,38 @@ export class Module {
         this.wasm.vcp_end_sample(asksRays, listens);
     }
 
+    /// Begins a sample that WebGL draws, as beginSample(). Returns null where the picture cannot go on.
+    gpuBegin(sample) {
+        if (this.checked(this.wasm.vcp_gpu_begin(sample)) === 0) return null;
+        const [copies, poolRows, records, version, asksRays, listens, images] = this.numbers(this.wasm.vcp_numbers(), 7);
+        return { copies, poolRows, records, version, asksRays, listens, images, ...this.gpuKind() };
+    }
+    /// Returns what shaders are compiled for the view with.
+    gpuKind() {
+        const [colour, sections, light] = this.numbers(this.wasm.vcp_gpu_kind(), 3);
+        return { colour, sections, light };
+    }
+    /// Returns which rows of the pool's texture are to be copied from the module's memory, and where they are.
+    gpuRows({ copies }) {
+        const words = this.wordsAt(this.wasm.vcp_gpu_rows(), 4 * copies);
+        return Array.from({ length: copies }, (_, i) => ({ first: words[4 * i], count: words[4 * i + 1], address: words[4 * i + 2] }));
+    }
+    /// Returns the words of the images: how many, and parts of the module's memory that have them.
+    gpuImages() {
+        const count = this.wasm.vcp_gpu_images(), list = this.wordsAt(this.wasm.vcp_gpu_image_parts(), 2 * count).slice();
+        const parts = Array.from({ length: count }, (_, i) => this.wordsAt(list[2 * i], list[2 * i + 1]));
+        return { count: parts.reduce((sum, part) => sum + part.length, 0), parts };
+    }
+    /// Says that WebGL has drawn sample 0, what the grid of pixels hit, and the marks of pages, or null.
+    gpuEnd({ listens }, grid, marks) {
+        const heard = listens ? grid : new Uint32Array(), seen = marks ?? new Uint32Array();
+        this.with(heard, hits => this.with(seen, at => this.wasm.vcp_gpu_end(hits, heard.length / 4, at, seen.length)));
+    }
+    /// Words of the module's memory, until it grows.
+    wordsAt(address, count) {
+        return new Uint32Array(this.wasm.memory.buffer, address, count);
+    }
+
     /// Returns the pages and tiles of images that `count` rows of the picture from `first` on need: `records` and `tiles`
     /// for beginCopied(), and of each its key and where its bytes are. Keys of tiles are below 0.
     needed(first, count) {

@@ -208,7 +208,7 @@ export class VcpViewer extends HTMLElement {
         this.shared = sharedBudget(budget, Number(this.getAttribute('workers') ?? NaN));
         this.worker.postMessage({
             type: 'open', url: new URL(this.src, document.baseURI).href, wasm: new URL('./vcp.wasm', import.meta.url).href,
-            budgetBytes: this.shared.pageBytes,
+            budgetBytes: this.shared.pageBytes, draw: this.getAttribute('draw'),
         });
         this.readNotes();
     }
@@ -236,18 +236,22 @@ export class VcpViewer extends HTMLElement {
         else if (message.type === 'error') this.fail('scan', message.message);
     }
 
-    show({ width, height, pixels, number, samples, update, fetched, memoryBytes, workers, moving, ms }) {
+    show({ width, height, pixels, bitmap, number, samples, update, fetched, memoryBytes, workers, drawnBy, moving, ms }) {
         if (moving) this.movingScale = movingScale(this.movingScale, ms);
         const { canvas } = this.parts;
         if (canvas.width !== width || canvas.height !== height) {
             canvas.width = width;
             canvas.height = height;
         }
-        canvas.getContext('2d').putImageData(new ImageData(pixels, width, height), 0, 0);
+        const context = canvas.getContext('2d');
+        if (bitmap) {
+            context.drawImage(bitmap, 0, 0);
+            bitmap.close();
+        } else context.putImageData(new ImageData(pixels, width, height), 0, 0);
         this.loading = update.settled ? '' : `Loading, ${(fetched.bytes / 1e6).toFixed(1)} MB`;
         this.showStatus();
         this.drawOver();
-        this.tell('progress', { number, samples, ...update, ...fetched, memoryBytes, workers, width, height });
+        this.tell('progress', { number, samples, ...update, ...fetched, memoryBytes, workers, drawnBy, ms, width, height });
     }
 
     fit() {

@@ -1,5 +1,6 @@
 // The first worker of a viewer: fetches, decodes, chooses pages and draws, with others where there are any (share.js), so
 // that the page never waits.
+import { Choice } from './choice.js';
 import { Module } from './module.js';
 import { Files, MissingFile, joined, overlap, urgentFirst, without } from './ranges.js';
 import { Caster, costsOf, partsOf } from './share.js';
@@ -17,6 +18,7 @@ let fetched = []; // stretches that came
 const casters = []; // the other workers
 let plan = null; // which bands of the picture are whose
 let costs = []; // milliseconds of each band of the last picture
+let choice, byGpu = false, castMs = 0; // who draws, who the picture at hand, and how long the processor took for its last sample
 
 function post(type, more = {}, transfer = []) {
     self.postMessage({ type, ...more }, transfer);
@@ -28,10 +30,11 @@ async function supply(stretches) {
     }));
 }
 
-async function open({ url, wasm, budgetBytes }) {
+async function open({ url, wasm, budgetBytes, draw }) {
     const program = await fetch(wasm);
     if (!program.ok) throw new Error(`${wasm}: the server answers ${program.status}; copy the whole folder of the viewer`);
     module = await Module.load(program);
+    choice = new Choice(module, draw, wake);
     ranges = new Files(url);
     const lead = await ranges.read(0, kLead);
     module.begin(ranges.size, url, budgetBytes);
@@ -120,14 +123,32 @@ function planned({ bands, rows }) {
     return { own, jobs };
 }
 
-/// Casts a sample of the view, and shows the picture where it is worth it. Returns how many samples there are then; 0
+/// Draws a sample of the view, and shows the picture where it is worth it. Returns how many samples there are then; 0
 /// where the picture cannot go on, null where it must be begun again.
-async function draw(view, update, sample) {
+function draw(view, update, sample) {
+    if (sample === 0) byGpu = choice.isGpus(view);
+    return byGpu ? drawByGpu(view, update, sample) : cast(view, update, sample);
+}
+
+function drawByGpu(view, update, sample) {
+    const began = performance.now(), drawn = choice.draw(view, sample, isShown(sample));
+    if (!drawn) return drawn === null ? 0 : null;
+    if (drawn.picture) show(view, update, sample + 1, { bitmap: drawn.picture }, performance.now() - began);
+    return sample + 1;
+}
+
+/// Pictures of 1, 2, 4, 8 samples are.
+function isShown(sample) {
+    return (sample + 1 & sample) === 0;
+}
+
+/// Does it by the processor.
+async function cast(view, update, sample) {
     const began = performance.now(), begun = module.beginSample(sample), { rows } = begun, { width, height } = view;
     if (begun.bands === 0) return 0;
     if (sample === 0) plan = planned(begun);
     else if (plan.jobs.some(({ caster }) => !caster.isReady)) return null;
-    const shows = (sample + 1 & sample) === 0, pixels = shows ? new Uint8ClampedArray(4 * width * height) : null;
+    const shows = isShown(sample), pixels = shows ? new Uint8ClampedArray(4 * width * height) : null;
     const ms = Array(begun.bands).fill(0);
     const put = (first, done) => {
         done.ms.forEach((x, i) => { ms[first + i] = x; });
@@ -153,15 +174,18 @@ async function draw(view, update, sample) {
     }
     if (sample === 0) module.endSample(begun);
     costs = ms;
-    if (shows) show(view, update, sample + 1, pixels, performance.now() - began);
+    castMs = performance.now() - began;
+    if (shows) show(view, update, sample + 1, { pixels }, castMs);
     return sample + 1;
 }
 
-function show({ width, height, number, moving }, update, samples, pixels, ms) {
+function show({ width, height, number, moving }, update, samples, picture, ms) {
     const fetched = { requests: ranges.requests, bytes: ranges.bytes }, ready = casters.filter(caster => caster.isReady);
     const memoryBytes = ready.reduce((sum, caster) => sum + caster.memoryBytes, module.memoryBytes());
-    post('picture', { width, height, pixels, number, samples, fetched, update, memoryBytes, workers: 1 + ready.length, moving, ms },
-        [pixels.buffer]);
+    const workers = byGpu ? 1 : 1 + ready.length, drawnBy = byGpu ? 'webgl' : 'processor';
+    post('picture', { width, height, ...picture, number, samples, fetched, update, memoryBytes, workers, drawnBy, moving, ms },
+        [picture.bitmap ?? picture.pixels.buffer]);
+    choice.start();
 }
 
 /// What is seen at a place of the picture, 0 to 1 from its upper left corner; null where the view has not been drawn.
@@ -190,7 +214,9 @@ async function run() {
         decodeJpegs();
         if (update.problem) post('problem', { message: update.problem });
         const isNew = drawn?.view !== now || update.changed || update.awaitsRays;
-        if (update.drawable && isNew) {
+        const isNowGpus = drawn?.view === now && !byGpu && choice.wanted === 'webgl' && choice.isGpus(now);
+        if (update.drawable && !isNew && !byGpu && choice.isOpen(now)) choice.judge(now, castMs);
+        if (update.drawable && (isNew || isNowGpus)) {
             drawn = { view: now, samples: await draw(now, update, 0) };
         } else if (update.settled && !now.moving && drawn?.view === now && drawn.samples < kSamples && now.mode < 3) {
             const samples = await draw(now, update, drawn.samples);

@@ -3,10 +3,11 @@ import { spawn } from 'node:child_process';
 import fs from 'node:fs';
 
 export class Browser {
-    /// `profile`: a folder for what it writes, until it is closed.
-    constructor(profile) {
+    /// `profile`: a folder for what it writes, until it is closed. `gpu`: what stands in for a GPU, SwiftShader.
+    constructor(profile, { gpu = false } = {}) {
         this.profile = profile;
-        this.process = spawn('chromium', ['--headless=new', '--no-sandbox', '--disable-gpu', '--disable-dev-shm-usage',
+        this.process = spawn('chromium', ['--headless=new', '--no-sandbox',
+            ...(gpu ? ['--use-angle=swiftshader', '--enable-unsafe-swiftshader'] : ['--disable-gpu']), '--disable-dev-shm-usage',
             '--remote-debugging-pipe', '--no-first-run', `--user-data-dir=${profile}`, 'about:blank'],
             { stdio: ['ignore', 'ignore', 'ignore', 'pipe', 'pipe'] });
         this.process.on('exit', code => { if (!this.closed) this.fail(new Error(`chromium ended with ${code}`)); });
@@ -62,7 +63,7 @@ export class Browser {
 
 class Page {
     constructor(browser, targetId, sessionId) {
-        Object.assign(this, { browser, targetId, sessionId, errors: [] });
+        Object.assign(this, { browser, targetId, sessionId, errors: [], workers: [] });
     }
     call(method, params = {}) {
         return this.browser.call(method, params, this.sessionId);
@@ -71,7 +72,10 @@ class Page {
     /// Hears what a session of this page says: the page's own, or that of one of its workers.
     async listen(session) {
         this.browser.hears.set(session, (method, params) => {
-            if (method === 'Target.attachedToTarget') this.listen(params.sessionId);
+            if (method === 'Target.attachedToTarget') {
+                this.workers.push(params.sessionId);
+                this.listen(params.sessionId);
+            }
             const text = ({ exception, text }) => String(exception?.description ?? exception?.value ?? text);
             if (method === 'Runtime.exceptionThrown') this.errors.push(text(params.exceptionDetails));
             if (method === 'Runtime.consoleAPICalled' && params.type === 'error') this.errors.push(String(params.args[0]?.value));
@@ -110,6 +114,22 @@ class Page {
         await at('touchStart', places[0]);
         for (const place of places.slice(1)) await at('touchMove', place);
         await at('touchEnd', []);
+    }
+
+    /// Ends all contexts of WebGL of its workers, as a browser may at any time; returns how many they were.
+    async loseContexts() {
+        let lost = 0;
+        for (const session of this.workers) {
+            const call = (method, params) => this.browser.call(method, params, session);
+            const { result: prototype } = await call('Runtime.evaluate', { expression: 'WebGL2RenderingContext.prototype' });
+            const { objects } = await call('Runtime.queryObjects', { prototypeObjectId: prototype.objectId });
+            const { result } = await call('Runtime.callFunctionOn', {
+                objectId: objects.objectId, returnByValue: true,
+                functionDeclaration: `function() { for (const gl of this) gl.getExtension('WEBGL_lose_context').loseContext(); return this.length; }`,
+            });
+            lost += result.value;
+        }
+        return lost;
     }
 
     async picture(file) {

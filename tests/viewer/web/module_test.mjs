@@ -5,7 +5,7 @@
 import assert from 'node:assert/strict';
 import fs from 'node:fs';
 import {
-    CasterHere, Files, Module, Orbit, Ranges, cast, check, checks, costsOf, hitsOf, joined, kFieldOfView, look, movingScale, opened, parseContentRange,
+    CasterHere, Choice, Files, Module, Orbit, Ranges, cast, check, checks, costsOf, hitsOf, joined, kFieldOfView, look, movingScale, opened, parseContentRange,
     partsOf, quick, server, settle, supply, urgentFirst, wasm, without,
 } from './module_use.mjs';
 import { compareDepth, readDepth } from './native_picture.mjs';
@@ -344,6 +344,7 @@ function useHostile(module, content) {
             if (update.drawable) {
                 cast(module, 0, 32, 32);
                 module.pick(16, 16);
+                if (module.gpuBegin(0).images > 0) module.gpuImages();
                 tiles = Math.max(tiles, module.needed(0, 32).tiles.length / 16);
                 isDrawn = true;
             }
@@ -352,6 +353,74 @@ function useHostile(module, content) {
     }
     return { said: '', isDrawn, decoded, tiles };
 }
+
+await check('WebGL draws once it has shown that it does so rightly, and faster', () => {
+    const view = { width: 320, height: 200, mode: 0 };
+    /// What is chosen where the processor sees `depth`, WebGL `seen(i)` at place i of its grid, after `ms` milliseconds.
+    const chosen = ({ depth = 5, seen = () => depth, ms = 0, drawn = true, of = view }) => {
+        const grid = new Uint32Array(4 * 384), floats = new Float32Array(grid.buffer);
+        for (let i = 0; i < 384; ++i) {
+            floats[4 * i] = seen(i);
+            grid[4 * i + 3] = seen(i) < 1e38 ? 1 : 0;
+        }
+        const draw = () => {
+            for (const end = performance.now() + ms; performance.now() < end;);
+            return drawn ? { grid } : null;
+        };
+        const gpu = { isLost: () => false, isReady: () => true, draw, closed: 0, close() { ++this.closed; } };
+        const module = { gpuKind: () => ({}), info: () => ({ cell: 2 }), pick: () => (depth < 1e38 ? { depth: 2 * depth } : null) };
+        const choice = Object.assign(new Choice(module, null, () => {}), { gpu });
+        assert.ok(choice.isOpen(of) === (of.mode <= 3) && !choice.isGpus(of));
+        choice.judge(of, 10);
+        assert.ok(!choice.isOpen(of) && gpu.closed === (choice.isGpus(view) ? 0 : 1), 'memory is given back');
+        return choice.isGpus(view);
+    };
+    const middles = new Set(Array.from({ length: 16 }, (_, i) => 24 * (2 + 4 * Math.floor(i / 4)) + 3 + 6 * (i % 4)));
+    const nth = n => [...middles][n];
+    assert.equal(chosen({}), true);
+    assert.equal(chosen({ depth: Infinity }), true, 'nothing is seen by either');
+    assert.equal(chosen({ seen: i => (i === nth(3) ? 7 : 5) }), true, 'one ray may miss an edge');
+    assert.equal(chosen({ seen: i => (i === nth(3) || i === nth(9) ? 7 : 5) }), false, 'two are wrong');
+    assert.equal(chosen({ seen: i => (i === nth(0) || i === nth(15) ? 3e38 : 5) }), false, 'holes');
+    assert.equal(chosen({ seen: () => 5.002 }), false);
+    assert.equal(chosen({ seen: () => NaN }), false);
+    assert.equal(chosen({ ms: 20 }), false, 'slower');
+    assert.equal(chosen({ drawn: false }), false);
+});
+
+await check('what WebGL draws with: rows are copied once, the table has the cut, and what rays say counts', async () => {
+    const ranges = quick(new Ranges('large.vcp', server(fs.readFileSync('large.vcp')))), module = await opened(ranges), orbit = new Orbit(), info = module.info();
+    orbit.fit(info.boundsMin, info.boundsMax, 1.6);
+    look(module, orbit);
+    const kInCut = 256, kRecordWords = 12;
+    const draw = () => {
+        const begun = module.gpuBegin(0), table = module.wordsAt(module.wasm.vcp_gpu_table(), kRecordWords * begun.records);
+        const records = Array.from({ length: begun.records }, (_, i) => i).filter(i => table[kRecordWords * i] & kInCut);
+        assert.ok(records.length > 0);
+        for (const i of records) assert.ok(table[kRecordWords * i + 3] < begun.poolRows * 1024, 'pages lie in the texture');
+        const marks = new Uint32Array(begun.records).fill(1), grid = new Uint32Array(4 * 384);
+        module.gpuEnd(begun, grid, begun.asksRays ? marks : null);
+        return { begun, rows: module.gpuRows(begun).reduce((sum, row) => sum + row.count, 0), records };
+    };
+    let rows = 0, update, asked = 0;
+    for (let round = 0; round < 1000 && !update?.settled; ++round) {
+        update = module.update();
+        if (update.drawable && (update.changed || update.awaitsRays)) {
+            const drawn = draw();
+            rows += drawn.rows;
+            asked += drawn.begun.asksRays;
+            assert.equal(module.gpuBegin(0).copies, 0, 'what was copied stays');
+            if (drawn.begun.asksRays) assert.equal(module.gpuBegin(0).asksRays, 0, 'rays are asked once');
+        }
+        if (!update.settled) await supply(module, ranges);
+    }
+    console.log(`   ${rows} rows copied for ${update.residentBytes} bytes of pages, rays asked ${asked} times`);
+    assert.ok(update.settled && asked > 0 && rows * 16384 >= update.residentBytes / 2);
+    module.wasm.vcp_gpu_forget();
+    const again = draw();
+    assert.ok(again.rows > 0 && again.rows <= again.begun.poolRows);
+    assert.notEqual(module.gpuBegin(1), null, 'the picture can go on');
+});
 
 await check('hostile files: the lines of the program, no trap, no growth', async () => {
     let module = await Module.load(wasm), refused = 0, opened = 0, drawn = 0, imaged = 0, jpegs = 0, traps = [], other = [], most = 0, i = 0;

@@ -8,6 +8,7 @@ const web = process.argv[2];
 const file = name => import(pathToFileURL(path.join(web, name)));
 export const { Module } = await file('module.js');
 export const { Files, MissingFile, Ranges, joined, parseContentRange, urgentFirst, without } = await file('ranges.js');
+export const { Choice } = await file('choice.js');
 export const { Caster, costsOf, partsOf } = await file('share.js');
 export const { Orbit, kFieldOfView, movingScale } = await file('camera.js');
 export const wasm = fs.readFileSync(path.join(web, 'vcp.wasm'));

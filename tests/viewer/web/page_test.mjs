@@ -109,6 +109,7 @@ async function looks(width, height, touch) {
     assert.equal(last.requests, asked.scan);
     assert.equal(last.bytes, asked.bytes);
     assert.ok(last.errorPixels <= 0.5 && last.samples === 8);
+    assert.equal(last.drawnBy, 'processor', 'what only stands in for a GPU is left alone');
     assert.ok(asked.bytes <= scan.length, 'nothing is fetched twice');
     if (scan.length <= kLead) assert.deepEqual([asked.scan, asked.bytes], [1, scan.length], 'a small scan is fetched once');
     await page.picture(path.join(pictures, `page_${width}.png`));

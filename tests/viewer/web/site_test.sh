@@ -21,9 +21,10 @@ expect() {
     [ "$(wc -l <err.txt)" = 1 ] || fail "more than one line: $(cat err.txt)"
 }
 
-# The folders are what is tested here, so the module itself and the decoder may be anything.
+# The folders are what is tested here, so the module itself, the decoder and the shaders may be anything.
 cp "$source"/viewer/web/*.js "$source"/viewer/web/vcp-viewer.d.ts "$source"/viewer/web/index.html viewer/
 echo "export function decompress() {}" >viewer/fzstd.js
+echo "export function shader() {}" >viewer/shaders.js
 echo licence >viewer/fzstd.LICENSE
 "$make_scan" --triangles 10000 -o scan.ply
 "$vcp" build scan.ply -o scan.vcp --progress none >/dev/null
@@ -38,7 +39,7 @@ expect 1 "short.vcp" "$vcp" publish short.vcp -o site --viewer viewer
 "$vcp" publish scan.vcp -o site/ --viewer viewer >/dev/null
 cmp scan.vcp site/scan.vcp
 for file in viewer/*; do cmp "$file" "site/$(basename "$file")"; done
-[ "$(ls -A site | wc -l)" = 14 ] || fail "site holds $(ls -A site)"
+[ "$(ls -A site | wc -l)" = 17 ] || fail "site holds $(ls -A site)"
 grep -q 'src="scan.vcp"' site/index.html || fail "the page shows another file"
 
 expect 2 "--overwrite" "$vcp" publish scan.vcp -o site --viewer viewer
@@ -75,7 +76,7 @@ for shard in shards/*.vcp; do cmp "$shard" "parted/$(basename "$shard")"; done
 "$vcp" pack parted/scan.vcp -o packed.vcp --progress none >/dev/null
 cmp scan.vcp packed.vcp
 "$vcp" publish scan.vcp -o parted --viewer viewer --overwrite >/dev/null
-[ "$(ls -A parted | wc -l)" = 14 ] || fail "shards are left: $(ls -A parted)"
+[ "$(ls -A parted | wc -l)" = 17 ] || fail "shards are left: $(ls -A parted)"
 
 expect 2 "no IPv4 address" "$vcp" serve site --address nowhere
 expect 1 "nothing_here" "$vcp" serve nothing_here

@@ -51,8 +51,8 @@ if command -v npm >/dev/null; then
     (cd "$web" && npm pack --dry-run --json --offline 2>/dev/null) >package_files.json
     "$node" -e '
         const files = JSON.parse(require("fs").readFileSync("package_files.json"))[0].files.map(file => file.path).sort();
-        const expected = ["README.md", "camera.js", "caster.js", "fzstd.LICENSE", "fzstd.js", "markup.js", "module.js", "package.json",
-            "ranges.js", "share.js", "vcp-viewer.d.ts", "vcp-viewer.js", "vcp.wasm", "worker.js"];
+        const expected = ["README.md", "camera.js", "caster.js", "choice.js", "fzstd.LICENSE", "fzstd.js", "gpu.js", "markup.js", "module.js", "package.json",
+            "ranges.js", "shaders.js", "share.js", "vcp-viewer.d.ts", "vcp-viewer.js", "vcp.wasm", "worker.js"];
         require("assert").deepEqual(files, expected);
         require("assert").equal(JSON.parse(require("fs").readFileSync(process.argv[1])).dependencies, undefined);
     ' "$web/package.json"

@@ -25,9 +25,10 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kPage = "index.html";
-constexpr std::array<std::string_view, 13> kViewerFiles{
-    kPage,       "vcp-viewer.js", "vcp-viewer.d.ts", "worker.js", "module.js",     "camera.js", "markup.js",
-    "ranges.js", "caster.js",     "share.js",        "fzstd.js",  "fzstd.LICENSE", "vcp.wasm"};
+constexpr std::array<std::string_view, 16> kViewerFiles{
+    kPage,       "vcp-viewer.js", "vcp-viewer.d.ts", "worker.js", "module.js", "camera.js",
+    "markup.js", "ranges.js",     "caster.js",       "choice.js", "fzstd.js",  "fzstd.LICENSE",
+    "gpu.js",    "shaders.js",    "share.js",        "vcp.wasm"};
 
 /// Whether a published folder holds a file of this name.
 bool isPublishedName(std::string_view name) {

@@ -19,11 +19,13 @@
 #include "render/frame_setup.h"
 #include "render/host_drawing.h"
 #include "render/pages/host_page_memory.h"
+#include "render/pages/image_words.h"
 #include "render/pixel_samples.h"
 #include "render/renderer_options.h"
 #include "render/residencies.h"
 #include "viewer/web/wasm/band_caster.h"
 #include "viewer/web/wasm/fetched_bytes.h"
+#include "viewer/web/wasm/gpu_frame.h"
 #include "viewer/web/wasm/image_copies.h"
 #include "viewer/web/wasm/jpeg_tiles.h"
 #include "viewer/web/wasm/page_copies.h"
@@ -53,6 +55,23 @@ struct WantedTile {
     uint32_t id, width, height, bytes, address;
 };
 
+/// Words in the memory of the module.
+struct PartOfWords {
+    uint32_t address, words;
+};
+
+/// What WebGL draws the frame with that was begun last.
+struct GpuFrame {
+    PoolMirror mirror;
+    std::vector<MirroredRows> rows;
+    std::vector<frame::TableRecord> table;
+    frame::FrameConstants constants;
+    std::vector<uint32_t> background;
+    std::shared_ptr<const ImageSet> images;
+    ImageWords words;
+    std::vector<PartOfWords> parts;
+};
+
 /// How far the images of the file have come: nothing of them is read before a page is drawn that shows some.
 enum class Images : uint8_t { Awaited, Shown, GivenUp };
 
@@ -77,6 +96,7 @@ struct Opened {
     SelectionView view;           // of the sample begun last
     uint64_t cut = 0, pages = 0;  // numbers of the picture's cut, and of its pages alone
     BandCaster caster;
+    GpuFrame gpu;
     BandsSaid heard;
     std::vector<CutRecord> records;
     std::vector<TileRecord> tiles;
@@ -167,6 +187,31 @@ Result<UpdateResult> update() {
     VCP_TRY_ASSIGN(auto update, updateShown({&shown, 1}, opened.request));
     if (opened.images == Images::Awaited && drawsImages()) awaitImages(*update);
     return *std::move(update);
+}
+
+/// What a sample of the picture is cast with. Errors: Cancelled, where the cut is not the picture's any more; Usage.
+Result<BandFrame> frameOf(uint32_t sample) {
+    const uint64_t cut = residency().cutNumber();
+    if (sample > 0 && cut != opened.cut) return Error::cancelled();
+    opened.cut = cut;
+    opened.pages = residency().pagesNumber();
+    BandFrame frame{opened.request, opened.errorPixels, sample == 0 && residency().asksRays(),
+                    sample == 0 && residency().listens(), residency().images()};
+    if (sample > 0) VCP_TRY(checkRefinable(frame.request, sample));
+    frame.request.sample = sample;
+    return frame;
+}
+
+int notBegun(const Error& error) { return error.code == ErrorCode::Cancelled ? kDone : fail(error); }
+
+/// What rays of a first sample said counts.
+void endSample(BandsSaid said, bool asksRays, bool listens) {
+    if (asksRays) {
+        std::vector<SeenPages> seen;
+        seen.push_back({&residency(), std::move(said.hit), opened.view, opened.pages});
+        seeAll(std::move(seen));
+    }
+    if (listens) residency().hear(said.feedback, opened.view);
 }
 
 /// Begins a sample; vcp_numbers() are then what other workers begin it with.
@@ -302,18 +347,8 @@ EXPORT(vcp_numbers) const double* vcp_numbers() { return opened.numbers; }
 /// bands, 0 where the cut is not the picture's any more. vcp_numbers() are then: rows of a band, error in pixels,
 /// whether rays are asked which pages they hit, and where.
 EXPORT(vcp_begin_sample) int vcp_begin_sample(int sample) {
-    const uint64_t cut = residency().cutNumber();
-    if (sample > 0 && cut != opened.cut) return 0;
-    opened.cut = cut;
-    opened.pages = residency().pagesNumber();
-    BandFrame frame{opened.request, opened.errorPixels, sample == 0 && residency().asksRays(),
-                    sample == 0 && residency().listens(), residency().images()};
-    if (sample > 0) {
-        const auto refinable = checkRefinable(frame.request, uint32_t(sample));
-        if (!refinable) return fail(refinable.error());
-    }
-    frame.request.sample = uint32_t(sample);
-    return beginSample(frame, cutPages(residency()));
+    const auto frame = frameOf(uint32_t(sample));
+    return frame ? beginSample(*frame, cutPages(residency())) : notBegun(frame.error());
 }
 
 /// Casts a band of the sample.
@@ -357,12 +392,74 @@ EXPORT(vcp_hear) void vcp_hear(const double* from) {
 EXPORT(vcp_end_sample) void vcp_end_sample(int asksRays, int listens) {
     BandsSaid said = opened.caster.said();
     said.add(opened.heard);
-    if (asksRays != 0) {
-        std::vector<SeenPages> seen;
-        seen.push_back({&residency(), std::move(said.hit), opened.view, opened.pages});
-        seeAll(std::move(seen));
-    }
-    if (listens != 0) residency().hear(said.feedback, opened.view);
+    endSample(std::move(said), asksRays != 0, listens != 0);
+}
+
+/// Returns GpuConstants of the view.
+EXPORT(vcp_gpu_kind) const double* vcp_gpu_kind() {
+    const GpuConstants constants = gpuConstants(opened.request, residency());
+    opened.numbers[0] = constants.colour, opened.numbers[1] = constants.sections, opened.numbers[2] = constants.light;
+    return opened.numbers;
+}
+
+/// Begins a sample that WebGL draws, as vcp_begin_sample() does. Returns 1; 0 where the cut is not the picture's any
+/// more. vcp_numbers() are then: the number of vcp_gpu_rows(), the rows that the texture of the pool must have, records
+/// of the table, a number of the table, whether rays are asked which pages they hit, and where, and a number of the
+/// images, 0 where none are shown.
+EXPORT(vcp_gpu_begin) int vcp_gpu_begin(int sample) {
+    const auto frame = frameOf(uint32_t(sample));
+    if (!frame) return notBegun(frame.error());
+    GpuFrame& gpu = opened.gpu;
+    opened.view = selectionView(frame->request);
+    gpu.rows = gpu.mirror.rowsToCopy(residency());
+    gpu.table = residency().table();
+    gpu.constants = frameConstants(frame->request, opened.dataset.get(), 1, opened.hasColour, frame->errorPixels);
+    gpu.constants.firstHitMark = 1;
+    gpu.constants.partRows = frame->request.height;
+    gpu.background = backgroundRows(frame->request);
+    const double numbers[] = {double(gpu.rows.size()),
+                              double(gpu.mirror.rows()),
+                              double(gpu.table.size()),
+                              double(residency().version()),
+                              frame->asksRays ? 1.0 : 0.0,
+                              frame->listens ? 1.0 : 0.0,
+                              residency().images() ? 1.0 + double(residency().imagesVersion()) : 0.0};
+    std::copy(std::begin(numbers), std::end(numbers), opened.numbers);
+    return 1;
+}
+EXPORT(vcp_gpu_rows) const MirroredRows* vcp_gpu_rows() { return opened.gpu.rows.data(); }
+EXPORT(vcp_gpu_table) const frame::TableRecord* vcp_gpu_table() { return opened.gpu.table.data(); }
+EXPORT(vcp_gpu_constants) const frame::FrameConstants* vcp_gpu_constants() { return &opened.gpu.constants; }
+/// The picture's background, RGBA8 of each row.
+EXPORT(vcp_gpu_background) const uint32_t* vcp_gpu_background() { return opened.gpu.background.data(); }
+/// Prepares the words of the images (ImageWords). Returns of how many vcp_gpu_image_parts() they are.
+EXPORT(vcp_gpu_images) int vcp_gpu_images() {
+    GpuFrame& gpu = opened.gpu;
+    gpu.images = residency().images();
+    gpu.words = imageWords(*gpu.images);
+    gpu.parts.clear();
+    const auto add = [&](std::span<const uint32_t> words) {
+        gpu.parts.push_back({uint32_t(reinterpret_cast<uintptr_t>(words.data())), uint32_t(words.size())});
+    };
+    add(gpu.words.tables);
+    for (const std::span<const uint32_t> texels : gpu.words.texels) add(texels);
+    return int(gpu.parts.size());
+}
+EXPORT(vcp_gpu_image_parts) const PartOfWords* vcp_gpu_image_parts() { return opened.gpu.parts.data(); }
+/// They are copied: the images may go.
+EXPORT(vcp_gpu_images_end) void vcp_gpu_images_end() {
+    opened.gpu.images = nullptr, opened.gpu.words = {}, opened.gpu.parts = {};
+}
+/// The texture of the pool holds nothing any more.
+EXPORT(vcp_gpu_forget) void vcp_gpu_forget() { opened.gpu.mirror.forget(); }
+/// WebGL has drawn sample 0. `hits`, `marks`: as feedbackOf() and pagesMarked() take them.
+EXPORT(vcp_gpu_end)
+void vcp_gpu_end(const glm::uvec4* hits, int hitCount, const uint32_t* marks, int markCount) {
+    BandsSaid said;
+    const auto& table = opened.gpu.table;
+    if (markCount > 0) said.hit = pagesMarked({marks, size_t(markCount)}, table, *opened.dataset, opened.request);
+    if (hitCount > 0) said.feedback = feedbackOf({hits, size_t(hitCount)}, table, *opened.dataset, opened.request);
+    endSample(std::move(said), markCount > 0, hitCount > 0);
 }
 
 /// Finds the pages that `count` rows of the picture from `first` on need, and the tiles of images. Returns how many

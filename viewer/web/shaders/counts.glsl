@@ -1,0 +1,5 @@
+// Browsers count no work.
+
+void countHit(bool found) {}
+
+void countWork(uint steps, uint fetches) {}

@@ -1,0 +1,5 @@
+precision highp float;
+precision highp int;
+out uint mark;
+
+void main() { mark = 1u; }
