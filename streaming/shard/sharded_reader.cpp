@@ -66,6 +66,13 @@ Result<void> copyFrom(std::span<const std::byte> from, uint64_t begin, uint64_t 
     return {};
 }
 
+/// Reads what a manifest says stands in a shard: of bytes behind a shard's end nobody asks a server.
+Result<void> readShard(const ByteReader& file, uint64_t offset, std::span<std::byte> bytes,
+                       const std::string& manifest) {
+    if (offset <= file.size() && bytes.size() <= file.size() - offset) return file.read(offset, bytes);
+    return brokenBytes(file.name(), "bytes", offset, fmt::format("end before what {} says is there", manifest));
+}
+
 Result<void> zeros(uint64_t, std::span<std::byte> bytes) {
     std::fill(bytes.begin(), bytes.end(), std::byte{0});
     return {};
@@ -167,7 +174,7 @@ Result<void> ShardedReader::readPages(uint64_t offset, std::span<std::byte> byte
         VCP_TRY_ASSIGN(const auto place, manifest_->runAt(offset));
         VCP_TRY_ASSIGN(const auto file, shardFile(place.run.shard));
         VCP_TRY(within(place.endOffset, offset, bytes, [&](uint64_t at, std::span<std::byte> part) {
-            return file->read(place.run.shardOffset + (at - place.run.offset), part);
+            return readShard(*file, place.run.shardOffset + (at - place.run.offset), part, name());
         }));
     }
     return {};
@@ -178,7 +185,9 @@ Result<void> ShardedReader::readImages(uint64_t offset, std::span<std::byte> byt
     const uint64_t begin = manifest_->fileHeader().images.offset, moved = begin - header.shardImages;
     const uint64_t table = begin + header.tileTable, tableEnd = table + header.tiles * sizeof(TileRow);
     VCP_TRY_ASSIGN(const auto file, shardFile(0));
-    const auto asStored = [&](uint64_t at, std::span<std::byte> part) { return file->read(at - moved, part); };
+    const auto asStored = [&](uint64_t at, std::span<std::byte> part) {
+        return readShard(*file, at - moved, part, name());
+    };
     // Tiles say where they are: whole rows are read, and what they say is moved.
     const auto asMoved = [&](uint64_t at, std::span<std::byte> part) -> Result<void> {
         const uint64_t firstRow = (at - table) / sizeof(TileRow),
@@ -250,7 +259,7 @@ Result<void> ShardedReader::copyEntries(std::span<const Segment> segments, uint6
     const ShardRow& shard = segments.front().shard;
     const uint64_t firstBlock = segments.front().firstBlock(), endBlock = segments.back().endBlock();
     std::vector<std::byte> stored((endBlock - firstBlock) * kBlockBytes);
-    VCP_TRY(file->read(blockOffset(firstBlock), stored));
+    VCP_TRY(readShard(*file, blockOffset(firstBlock), stored, name()));
     for (uint64_t b = firstBlock; b < endBlock; ++b) {
         const auto block = std::span(stored).subspan((b - firstBlock) * kBlockBytes, kBlockBytes);
         const auto sound = checkBlock(file->name(), b,
