@@ -110,4 +110,7 @@ void storeTileStart(uvec2 tile, float start) {
 // Notes that rays of a kind hit a page, or begin in it. Precondition: marks are asked for.
 void storeMark(uint record, uint kind) { feedback[frame.firstHitMark + 2u * record + kind] = 1u; }
 
+// Notes the page of a pixel's hit, for bindings that have no marks.
+void storeHitPage(uint record, bool found) {}
+
 #include "render/shaders/frame_reads.glsl"

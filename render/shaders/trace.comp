@@ -81,33 +81,46 @@ bool hasParts(Hit hit, uint kind) {
     return has;
 }
 
-// Whether a point in a section plane, the ray's origin, is inside of the solid: an odd number of walls lies
-// behind. Two of three rays decide, for one may graze a wall.
-bool isInside(Ray ray, inout Work work) {
-    vec3 side = normalize(abs(ray.direction.z) < 0.7 ? vec3(ray.direction.y, -ray.direction.x, 0.0)
-                                                     : vec3(0.0, ray.direction.z, -ray.direction.y));
-    uint inside = 0u, outside = 0u;
-    for (int k = 0; inside < 2u && outside < 2u; k++) {
-        Ray onward = ray;
-        onward.direction = withoutZeros(normalize(ray.direction + (k == 0 ? 0.0 : k == 1 ? 0.13 : -0.17) * side));
-        onward.inverse = 1.0 / onward.direction;
-        uint crossings = 0u;
-        bool open = true;
-        Wall before = Wall(vec3(0.0), 0.0);
-        for (uint turn = 0u; open && turn < kMostCrossings; turn++) {
-            Hit wall = castRay(onward, 0.0, kNoHit, work);
-            open = wall.depth < kNoHit;
-            float cell = powerOfTwo(int(frame.finestLevel) + wall.pageBits - int(kLatticeBits));
-            if (hasParts(wall, kRecordIsOpen))
-                before.gap += wall.depth + kPastHit * cell;
-            else
-                crossings += open && isNewWall(wall, cell, onward.direction, before) ? 1u : 0u;
-            onward = movedAlong(onward, open ? wall.depth + kPastHit * cell : 0.0);
-        }
-        inside += crossings & 1u;
-        outside += 1u - (crossings & 1u);
-    }
-    return inside == 2u;
+// Whether a point in a section plane is inside of the solid: an odd number of walls lies behind. Two of three rays
+// decide, for one may graze a wall.
+struct InsideTest {
+    Ray ray;  // onward from the last wall
+    uint number, inside, outside;
+    uint walls, crossings;  // that the ray has met, and that count
+    Wall before;
+};
+
+// Begins with the next ray from the origin of `eyeRay`.
+void nextRay(inout InsideTest test, Ray eyeRay) {
+    vec3 d = eyeRay.direction;
+    vec3 side = normalize(abs(d.z) < 0.7 ? vec3(d.y, -d.x, 0.0) : vec3(0.0, d.z, -d.y));
+    test.ray = eyeRay;
+    test.ray.direction = withoutZeros(normalize(d + (test.number == 0u   ? 0.0
+                                                     : test.number == 1u ? 0.13
+                                                                         : -0.17) *
+                                                        side));
+    test.ray.inverse = 1.0 / test.ray.direction;
+    test.walls = 0u;
+    test.crossings = 0u;
+    test.before = Wall(vec3(0.0), 0.0);
+}
+
+// Takes in the wall that the test's ray has met. Returns whether it is to go on.
+bool takeWall(inout InsideTest test, Hit wall, Ray eyeRay) {
+    bool open = wall.depth < kNoHit;
+    float cell = powerOfTwo(int(frame.finestLevel) + wall.pageBits - int(kLatticeBits));
+    if (hasParts(wall, kRecordIsOpen))
+        test.before.gap += wall.depth + kPastHit * cell;
+    else
+        test.crossings += open && isNewWall(wall, cell, test.ray.direction, test.before) ? 1u : 0u;
+    test.ray = movedAlong(test.ray, open ? wall.depth + kPastHit * cell : 0.0);
+    test.walls++;
+    if (open && test.walls < kMostCrossings) return true;
+    test.inside += test.crossings & 1u;
+    test.outside += 1u - (test.crossings & 1u);
+    test.number++;
+    nextRay(test, eyeRay);
+    return test.inside < 2u && test.outside < 2u;
 }
 
 // Finds the point of the plane through `place` that is seen at a point of the picture. Returns false where the plane is
@@ -119,50 +132,63 @@ bool findInPlane(vec2 point, vec3 place, vec3 normal, out vec3 found) {
     return along < -kLeastPlaneCosine;
 }
 
-// Finds the cut of an open surface that is so near in the picture to a point of a section plane that its line covers
-// it. `pixel`: where that is seen.
-bool findLine(vec2 pixel, vec3 place, vec3 normal, out Hit hit, inout Work work) {
-    bool found = false;
-    for (int axis = 0; !found && axis < 2; axis++) {
-        vec2 aside = axis == 0 ? vec2(kLinePixels, 0.0) : vec2(0.0, kLinePixels);
-        vec3 from, to;
-        bool isSeen = findInPlane(pixel - aside, place, normal, from);
-        isSeen = findInPlane(pixel + aside, place, normal, to) && isSeen;
-        float reach = distance(from, to);
-        Ray along;
-        along.origin = from;
-        along.direction = withoutZeros((to - from) / max(reach, 1e-30));
-        along.inverse = 1.0 / along.direction;
-        hit = castRay(along, 0.0, reach, work);
-        found = isSeen && hit.depth <= reach && hasParts(hit, kRecordHasOpen);
-    }
-    return found;
+// Finds a short piece of a section plane about a point, across which an open surface is cut where its line covers the
+// point: along x or y of the picture. `pixel`: where the point is seen. Returns false where there is none.
+bool findPiece(vec2 pixel, vec3 place, vec3 normal, bool alongX, out Ray piece, out float reach) {
+    vec2 aside = alongX ? vec2(kLinePixels, 0.0) : vec2(0.0, kLinePixels);
+    vec3 from, to;
+    bool isSeen = findInPlane(pixel - aside, place, normal, from);
+    isSeen = findInPlane(pixel + aside, place, normal, to) && isSeen;
+    reach = distance(from, to);
+    piece.origin = from;
+    piece.direction = withoutZeros((to - from) / max(reach, 1e-30));
+    piece.inverse = 1.0 / piece.direction;
+    return isSeen;
 }
+
+// What the rays of a cut pixel are asked, one after the other. One place casts them all: devices that compile each
+// place anew take as many times as long.
+const uint kAskFirst = 0u;   // what is seen first
+const uint kAskInside = 1u;  // whether the point where the ray enters is inside
+const uint kAskLineX = 2u;   // whether the line of an open surface covers it
+const uint kAskLineY = 3u;
+const uint kAskNothing = 4u;
 
 // Finds the first hit in what the section planes leave, and on the caps. `pixel`: where the ray is seen.
 Hit castCut(Ray ray, vec2 pixel, Interval kept, float from, inout bool onCap, inout Work work) {
-    Ray rest = movedAlong(ray, kept.first);
-    float last = kept.last - kept.first;
+    Ray rest = movedAlong(ray, kept.first), now = rest;
+    float last = kept.last - kept.first, until = last;
     // Where pages are marked, rays are to begin in those that the plane cuts.
     float start = frame.firstHitMark != 0u ? 0.0 : max(from - kept.first, 0.0);
-    Hit hit = castRay(rest, start, last, work);
-    if (hit.depth > last) hit.depth = kNoHit;
-    if (kSections >= 2u) {
-        // This loop runs once; a device that skips nothing skips it where no ray enters through a plane.
-        bool entering = kept.first > 0.0 && kept.first < kept.last;
-        while (entering) {
-            onCap = isInside(rest, work);
-            Hit line;
-            if (kSections == 3u && !onCap && findLine(pixel, rest.origin, kept.plane, line, work)) {
-                hit = line;
-                onCap = true;
-            }
-            entering = false;
+    bool entering = kSections >= 2u && kept.first > 0.0 && kept.first < kept.last, isSeen = false;
+    InsideTest test = InsideTest(rest, 0u, 0u, 0u, 0u, 0u, Wall(vec3(0.0), 0.0));
+    Hit first;
+    uint asks = kAskFirst;
+    while (asks != kAskNothing) {
+        Hit hit = castRay(now, start, until, work);
+        if (asks == kAskFirst) {
+            first = hit;
+            if (first.depth > last) first.depth = kNoHit;
+            asks = entering ? kAskInside : kAskNothing;
+            nextRay(test, rest);
+        } else if (asks == kAskInside) {
+            bool goesOn = takeWall(test, hit, rest);
+            onCap = test.inside == 2u;
+            if (!goesOn) asks = kSections == 3u && !onCap ? kAskLineX : kAskNothing;
+        } else {
+            onCap = isSeen && hit.depth <= until && hasParts(hit, kRecordHasOpen);
+            if (onCap) first = hit;
+            asks = onCap || asks == kAskLineY ? kAskNothing : kAskLineY;
         }
-        if (onCap) hit.depth = 0.0;
+        now = test.ray;
+        start = 0.0;
+        until = kNoHit;
+        if (kSections == 3u && (asks == kAskLineX || asks == kAskLineY))
+            isSeen = findPiece(pixel, rest.origin, kept.plane, asks == kAskLineX, now, until);
     }
-    if (hit.depth < kNoHit) hit.depth += kept.first;
-    return hit;
+    if (onCap) first.depth = 0.0;
+    if (first.depth < kNoHit) first.depth += kept.first;
+    return first;
 }
 
 // Returns what a false colour shows of a hit, 0 to 1 (ShadingMode).
@@ -226,6 +252,7 @@ void main() {
         storeHit(frame.lightPlane * plane + at, floatBitsToUint(shown));
     }
 
+    storeHitPage(hit.record, found);
     countHit(found);
     if (kCountSteps != 0u) countWork(work.steps, work.steps + work.fetches);
 }

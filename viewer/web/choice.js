@@ -1,22 +1,28 @@
 // Who draws: the processor, until WebGL has drawn the same picture, and in less time.
 
-const kChecked = [4, 4], kMostWrong = 1; // pixels that are compared, and how many may be on the other side of an edge
-const kWorst = 1e-3; // depth that may be between the two, in cells
+const kSlowMs = 30; // pictures that take the processor less are no matter
+const kFewestHits = 200, kMostWrong = 0.01; // of a band that is compared: its hits, and their part that may differ, at edges
+const kWorstDepth = 1e-3, kWorstColour = 8; // in cells, beside the rounding of single precision, and of 255
 const kPollMs = 100, kRevivals = 3;
 const kLastMode = 3; // of those that show light, colours or normals; false colours are the processor's
 
 export class Choice {
     /// `wanted`: 'webgl' or 'processor' where the page says who draws. `wake`: to be called once WebGL can draw.
     constructor(module, wanted, wake) {
-        Object.assign(this, { module, wanted, wake, gpu: null, isChosen: wanted === 'webgl', isJudged: wanted === 'webgl', isPolling: false, revivals: 0 });
+        Object.assign(this, { module, wanted, wake, gpu: null, begun: wanted === 'processor', isPolling: false, revivals: 0 });
+        this.chosen = new Set(); // kinds of pictures that WebGL draws
     }
     /// Begins with WebGL where there is any.
     async start() {
-        if (this.wanted === 'processor' || this.begun) return;
+        if (this.begun) return;
         this.begun = true;
-        const { Gpu } = await import('./gpu.js');
-        this.gpu = Gpu.create(this.wanted === 'webgl');
-        this.poll();
+        try {
+            const { Gpu } = await import('./gpu.js');
+            this.gpu = Gpu.create(this.wanted === 'webgl');
+            this.poll();
+        } catch {
+            this.gpu = null; // the processor does without
+        }
     }
     /// Wakes the loop once the programs for the view are compiled.
     poll() {
@@ -31,56 +37,68 @@ export class Choice {
         this.isPolling = true;
         return false;
     }
-    /// WebGL's context is gone, or it does what it should not: the processor draws, and WebGL is tried again.
+    /// Does without WebGL.
+    end() {
+        this.gpu?.close();
+        this.gpu = null;
+    }
+    /// WebGL's context is gone, or did what it should not: the processor draws, and a lost one is tried again.
     lose() {
         const { isWrong } = this.gpu;
         this.end();
         if (isWrong || ++this.revivals > kRevivals) return;
-        this.begun = false;
-        setTimeout(() => this.start(), 1000 * this.revivals);
+        setTimeout(() => {
+            this.begun = false;
+            this.start();
+        }, 1000 * this.revivals);
     }
 
+    kind() {
+        return JSON.stringify(this.module.gpuKind());
+    }
     /// Whether WebGL draws the next picture of a view.
     isGpus({ mode }) {
-        return this.isChosen && this.canDraw(mode);
+        return (this.wanted === 'webgl' || this.chosen.has(this.kind())) && this.canDraw(mode);
     }
-    /// Whether WebGL is to be compared with a picture that the processor drew.
-    isOpen({ mode }) {
-        return !this.isJudged && this.canDraw(mode);
+    /// Whether WebGL is to be compared with a whole picture that the processor drew in `ms`.
+    isOpen(view, ms) {
+        return this.wanted === null && view !== this.judged && ms > kSlowMs && !this.chosen.has(this.kind()) && this.canDraw(view.mode);
     }
-    /// Compares it with what the processor drew of the view in `ms`.
+    /// Compares it with the picture of a view that is settled and at rest.
     judge(view, ms) {
-        this.isJudged = true;
-        if (!this.gpu.draw(this.module, view, 0, false)) return this.end();
-        const began = performance.now(), again = this.gpu.draw(this.module, view, 0, false);
-        this.isChosen = again !== null && performance.now() - began < ms && this.isRight(view, again.grid);
-        if (!this.isChosen) this.end();
+        this.judged = view;
+        this.draw(view, 0, false, true);
+        const began = performance.now(), isDrawn = this.gpu !== null && this.draw(view, 0, false, true), took = performance.now() - began;
+        if (!isDrawn) return;
+        const { hits, wrong } = this.compared(view);
+        if (took >= ms || wrong > kMostWrong * hits) this.end();
+        else if (hits >= kFewestHits) this.chosen.add(this.kind());
     }
-    /// Does without WebGL.
-    end() {
-        this.gpu.close();
-        this.gpu = null;
-    }
-    isRight({ width, height }, grid) {
-        const floats = new Float32Array(grid.buffer), { cell } = this.module.info();
-        let wrong = 0;
-        for (let i = 0; i < kChecked[0] * kChecked[1]; ++i) {
-            // Of the grid of 24 x 16 pixels those in the middles of 4 x 4 parts.
-            const x = 3 + 6 * (i % kChecked[0]), y = 2 + 4 * Math.floor(i / kChecked[0]), at = 4 * (24 * y + x);
-            const hit = this.module.pick(Math.floor((x + 0.5) * width / 24), Math.floor((y + 0.5) * height / 16));
-            const depth = Math.abs(floats[at]), isHit = grid[at + 3] !== 0;
-            if (isHit !== (hit !== null) || (isHit && Math.abs(depth - hit.depth / cell) > kWorst * Math.max(1, depth * 1e-3))) ++wrong;
-        }
-        return wrong <= kMostWrong;
+    /// Casts the band in the middle; returns how many of its pixels hit something, and how many WebGL drew otherwise.
+    compared(view) {
+        const { bands, rows } = this.module.beginSample(0), band = bands >> 1, { cell } = this.module.info();
+        const { pixels } = this.module.castBands(view, rows, band, 1, true), depth = this.module.depth(pixels.length / 4);
+        const ours = this.gpu.rowsShown(band * rows, depth.length / view.width), bytes = new Uint8Array(ours.colours.buffer);
+        let hits = 0, wrong = 0;
+        depth.forEach((theirs, i) => {
+            const cells = Math.abs(ours.depth[i]), isHit = Number.isFinite(theirs);
+            const apart = Math.abs(cells - theirs / cell), isColour = [0, 1, 2].every(k => Math.abs(bytes[4 * i + k] - pixels[4 * i + k]) <= kWorstColour);
+            hits += isHit;
+            if (!isColour || isHit !== cells < 3e38 || (isHit && !(apart <= kWorstDepth + 1e-6 * cells))) ++wrong;
+        });
+        return { hits, wrong };
     }
 
     /// Draws a sample by WebGL: what Gpu.draw() returns; undefined where WebGL was lost.
-    draw(view, sample, shows) {
-        const drawn = this.gpu.draw(this.module, view, sample, shows);
-        if (!drawn && this.gpu.isLost()) {
-            this.lose();
-            return undefined;
+    draw(view, sample, shows, isSettled) {
+        let drawn = null;
+        try {
+            drawn = this.gpu.draw(this.module, view, sample, shows, isSettled);
+        } catch {
+            this.gpu.isWrong = true;
         }
-        return drawn;
+        if (drawn || !this.gpu.isLost()) return drawn;
+        this.lose();
+        return undefined;
     }
 }

@@ -8,7 +8,9 @@ import { shader } from './shaders.js';
 
 const kRowTexels = 1024, kLayerRows = 1024; // of a texture of rows
 const kOwnUnit = 15; // where textures are made
-const kGrid = [24, 16]; // pixels that say what they hit
+export const kGrid = [24, 16]; // pixels that say what they hit
+const kUnread = 0xfffffffe; // what stands where a lost context has read nothing: no record or mark
+const kImagesMs = 500; // between copies of images, while more come
 const kMostPixels = 1 << 18; // of one call: what takes seconds would end the context
 
 /// The units of textures by the names that shaders have for them.
@@ -22,18 +24,19 @@ function isEmulated(gl) {
 }
 
 export class Gpu {
-    /// Returns null where there is no WebGL 2; `anyDevice`: one that is only emulated is taken as well.
+    /// Returns null where there is no WebGL 2; `anyDevice`: one that is only emulated, or must be waited for while it compiles,
+    /// is taken as well.
     static create(anyDevice) {
         const canvas = new OffscreenCanvas(1, 1);
         const gl = canvas.getContext('webgl2', {
             alpha: false, antialias: false, depth: false, stencil: false, powerPreference: 'high-performance',
             failIfMajorPerformanceCaveat: !anyDevice,
         });
-        if (!gl || (!anyDevice && isEmulated(gl))) return null;
+        if (!gl || (!anyDevice && (isEmulated(gl) || !gl.getExtension('KHR_parallel_shader_compile')))) return null;
         return new Gpu(canvas, gl);
     }
     constructor(canvas, gl) {
-        Object.assign(this, { canvas, gl, programs: new Map(), targets: {}, size: [0, 0], layers: 0, tableVersion: null, kinds: new Map(), isWrong: false });
+        Object.assign(this, { canvas, gl, programs: new Map(), kinds: new Map(), targets: {}, size: [0, 0], layers: 0, imageBytes: 0, imagesAt: -kImagesMs, isWrong: false });
         this.parallel = gl.getExtension('KHR_parallel_shader_compile');
         this.frames = gl.createBuffer();
         this.empty = this.texture(1, 1, false);
@@ -82,7 +85,7 @@ export class Gpu {
         gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
         parts.forEach(({ texture }, i) => gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0 + i, gl.TEXTURE_2D, texture, 0));
         gl.drawBuffers(parts.map((_, i) => gl.COLOR_ATTACHMENT0 + i));
-        return { framebuffer, parts, width, height };
+        return { framebuffer, parts, wide, width, height };
     }
     release({ framebuffer, parts }) {
         this.gl.deleteFramebuffer(framebuffer);
@@ -124,6 +127,7 @@ export class Gpu {
                 gl.shaderSource(part, `#version 300 es\n${text}`);
                 gl.compileShader(part);
                 gl.attachShader(program, part);
+                gl.deleteShader(part); // with the program
             }
             gl.linkProgram(program);
             this.programs.set(key, made = { program, isReady: false });
@@ -136,6 +140,7 @@ export class Gpu {
     }
     finish(made) {
         const { gl } = this, { program } = made;
+        if (gl.isContextLost()) return;
         if (!gl.getProgramParameter(program, gl.LINK_STATUS)) {
             this.isWrong = true;
             return;
@@ -175,10 +180,13 @@ export class Gpu {
     /// what is signalled when it is through.
     warm(module, kind, programs) {
         const { gl } = this;
-        this.copyAll(module, this.begin(module, 0), 8);
+        this.copyAll(module, this.begin(module, 0), 8, false);
         this.resize(8, 8, kind, true);
         this.passes(kind, programs, 0);
-        this.passes(kind, programs, 1);
+        const shown = this.passes(kind, programs, 1);
+        this.drawGrid(programs.probe);
+        this.drawMarks(programs.marks);
+        this.show(programs.show, shown).close();
         const sync = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
         gl.flush();
         return sync;
@@ -200,10 +208,10 @@ export class Gpu {
         }
         gl.disable(gl.SCISSOR_TEST);
     }
-    copyAll(module, begun, height) {
+    copyAll(module, begun, height, isSettled) {
         this.copyRows(module, begun);
         this.copyTable(module, begun);
-        this.copyImages(module, begun);
+        this.copyImages(module, begun, isSettled);
         this.copyFrame(module, height);
     }
     copyRows(module, begun) {
@@ -234,8 +242,11 @@ export class Gpu {
         }
     }
     /// Copies the images, all of them when any have come.
-    copyImages(module, { images }) {
-        if (this.imagesNumber === images) return;
+    copyImages(module, { images }, isSettled) {
+        const soon = this.imagesNumber > 0 && images > 0 && performance.now() - this.imagesAt < kImagesMs;
+        // What is there has tables of its own: until the last have come it is not copied too often.
+        if (this.imagesNumber === images || (soon && !isSettled)) return;
+        this.imagesAt = performance.now();
         const { gl } = this, { count, parts } = images === 0 ? { count: 1, parts: [] } : module.gpuImages();
         const most = 4 * kRowTexels * kLayerRows, layers = Math.ceil(count / most);
         gl.deleteTexture(this.images ?? null);
@@ -258,15 +269,16 @@ export class Gpu {
         if (filled > 0) put();
         this.bind(kUnits.imageTexels, this.images, gl.TEXTURE_2D_ARRAY);
         this.imagesNumber = images;
+        this.imageBytes = 4 * count;
         if (images !== 0) module.wasm.vcp_gpu_images_end();
     }
     copyFrame(module, height) {
         const { gl } = this;
         gl.bindBuffer(gl.UNIFORM_BUFFER, this.frames);
-        gl.bufferData(gl.UNIFORM_BUFFER, module.wordsAt(module.wasm.vcp_gpu_constants(), 152), gl.DYNAMIC_DRAW);
+        gl.bufferData(gl.UNIFORM_BUFFER, module.gpuConstants(), gl.DYNAMIC_DRAW);
         gl.bindBufferBase(gl.UNIFORM_BUFFER, 0, this.frames);
         gl.deleteTexture(this.background?.texture ?? null);
-        this.background = this.texture(1, height, false, module.wordsAt(module.wasm.vcp_gpu_background(), height).slice());
+        this.background = this.texture(1, height, false, module.wordsAt(module.wasm.vcp_gpu_background(), height));
         this.bind(kUnits.rowColours, this.background.texture);
     }
     /// Begins a sample, with all that it reads in place. Returns null where the picture cannot go on.
@@ -274,7 +286,8 @@ export class Gpu {
         if (this.layers === 0) module.wasm.vcp_gpu_forget(); // another context may have had it all
         let begun = module.gpuBegin(sample);
         if (begun && begun.poolRows > this.layers * kLayerRows) {
-            const layers = Math.max(Math.ceil(begun.poolRows / kLayerRows), Math.floor(1.5 * this.layers));
+            const grown = Math.min(Math.floor(1.5 * this.layers), Math.ceil(begun.mostRows / kLayerRows));
+            const layers = Math.max(Math.ceil(begun.poolRows / kLayerRows), grown);
             this.gl.deleteTexture(this.pool ?? null);
             this.pool = this.rows(layers);
             this.layers = layers;
@@ -287,16 +300,18 @@ export class Gpu {
 
     /// Draws a sample of a view: 0 begins a picture. Returns null where it cannot go on, or cannot be drawn; else the
     /// picture, where it `shows`, and what the grid of pixels hit: depth in cells and record plus 1, four words each.
-    draw(module, { width, height }, sample, shows) {
+    draw(module, { width, height }, sample, shows, isSettled) {
         const begun = this.begin(module, sample);
         const programs = begun && this.programsOf(begun, sample > 0);
         if (!programs) return null;
-        this.copyAll(module, begun, height);
+        this.copyAll(module, begun, height, isSettled);
         this.resize(width, height, begun, sample > 0);
         const shown = this.passes(begun, programs, sample), grid = this.readGrid(programs.probe);
-        if (sample === 0) module.gpuEnd(begun, grid, begun.asksRays ? this.readMarks(programs.marks, begun) : null);
+        const marks = sample === 0 && begun.asksRays ? this.readMarks(programs.marks, begun) : null;
         if (this.gl.getError() !== this.gl.NO_ERROR) this.isWrong = true;
-        if (this.isLost()) return null;
+        // A context may be lost before it says so.
+        if (this.isLost() || grid[3] === kUnread || marks?.[0] === kUnread) return null;
+        if (sample === 0) module.gpuEnd(begun, grid, marks);
         return { picture: shows ? this.show(programs.show, shown) : null, grid };
     }
     /// Draws a sample as large as the targets are; returns the texture that shows it, or the mean of it and those before.
@@ -334,32 +349,50 @@ export class Gpu {
         gl.drawArrays(gl.TRIANGLES, 0, 3);
         return canvas.transferToImageBitmap();
     }
+    drawGrid(made) {
+        this.gl.useProgram(made.program);
+        this.gl.uniform2i(this.gl.getUniformLocation(made.program, 'grid'), ...kGrid);
+        this.run(made, this.grid);
+    }
     /// Waits until all is drawn.
     readGrid(made) {
-        const { gl } = this, words = new Uint32Array(4 * kGrid[0] * kGrid[1]);
-        gl.useProgram(made.program);
-        gl.uniform2f(gl.getUniformLocation(made.program, 'grid'), ...kGrid);
-        this.run(made, this.grid);
-        gl.readPixels(0, 0, ...kGrid, gl.RGBA_INTEGER, gl.UNSIGNED_INT, words);
-        return words;
+        this.drawGrid(made);
+        return this.read(this.grid, 0, kGrid[1]);
     }
-    readMarks({ program }, { records }) {
-        const { gl } = this, { framebuffer, width, height } = this.marksTarget, words = new Uint32Array(4 * width * height);
+    drawMarks({ program }) {
+        const { gl } = this, { framebuffer, width, height } = this.marksTarget, points = this.size[0] * this.size[1];
         gl.useProgram(program);
         gl.uniform2f(gl.getUniformLocation(program, 'size'), width, height);
         gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
         gl.viewport(0, 0, width, height);
         gl.clearBufferuiv(gl.COLOR, 0, [0, 0, 0, 0]);
-        gl.drawArrays(gl.POINTS, 0, this.size[0] * this.size[1]);
-        gl.readPixels(0, 0, width, height, gl.RGBA_INTEGER, gl.UNSIGNED_INT, words);
+        for (let first = 0; first < points; first += kMostPixels) {
+            gl.drawArrays(gl.POINTS, first, Math.min(kMostPixels, points - first));
+            gl.flush();
+        }
+    }
+    readMarks(made, { records }) {
+        this.drawMarks(made);
+        const words = this.read(this.marksTarget, 0, this.marksTarget.height);
         return Uint32Array.from({ length: records }, (_, i) => words[4 * i]);
     }
-    /// Returns the depths of the picture drawn last, in cells; 0 and above 3e38 where nothing is hit.
-    depths() {
-        const { gl } = this, [width, height] = this.size, words = new Uint32Array(4 * width * height);
-        gl.bindFramebuffer(gl.FRAMEBUFFER, this.targets.hits.framebuffer);
-        gl.readPixels(0, 0, width, height, gl.RGBA_INTEGER, gl.UNSIGNED_INT, words);
-        const floats = new Float32Array(words.buffer);
-        return Float32Array.from({ length: width * height }, (_, i) => floats[4 * i]);
+    /// Returns rows of a target's first texture, four words a texel.
+    read({ framebuffer, width }, first, count) {
+        const { gl } = this, words = new Uint32Array(4 * width * count).fill(kUnread);
+        gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
+        gl.readPixels(0, first, width, count, gl.RGBA_INTEGER, gl.UNSIGNED_INT, words);
+        return words;
+    }
+    /// Returns what rows of the picture drawn last show in its first sample: colours, RGBA8, and depths in cells, below 0
+    /// on the cap of a section and 3e38 or more where nothing is hit.
+    rowsShown(first, count) {
+        const depths = new Float32Array(this.read(this.targets.hits, first, count).buffer), words = this.read(this.targets.first, first, count);
+        const every = (array, from) => array.map((_, i) => from[4 * i]);
+        return { colours: every(new Uint32Array(words.length / 4), words), depth: every(new Float32Array(words.length / 4), depths) };
+    }
+    /// Returns how much memory its textures take.
+    bytes() {
+        const targets = Object.values(this.targets).flatMap(target => target.parts.map((_, i) => (target.wide[i] ? 16 : 4) * target.width * target.height));
+        return targets.reduce((sum, one) => sum + one, 16 * kRowTexels * kLayerRows * this.layers + this.imageBytes);
     }
 }

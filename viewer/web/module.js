@@ -191,8 +191,8 @@ export class Module {
     /// Begins a sample that WebGL draws, as beginSample(). Returns null where the picture cannot go on.
     gpuBegin(sample) {
         if (this.checked(this.wasm.vcp_gpu_begin(sample)) === 0) return null;
-        const [copies, poolRows, records, version, asksRays, listens, images] = this.numbers(this.wasm.vcp_numbers(), 7);
-        return { copies, poolRows, records, version, asksRays, listens, images, ...this.gpuKind() };
+        const [copies, poolRows, mostRows, records, version, asksRays, listens, images] = this.numbers(this.wasm.vcp_numbers(), 8);
+        return { copies, poolRows, mostRows, records, version, asksRays, listens, images, ...this.gpuKind() };
     }
     /// Returns what shaders are compiled for the view with.
     gpuKind() {
@@ -209,6 +209,9 @@ export class Module {
         const count = this.wasm.vcp_gpu_images(), list = this.wordsAt(this.wasm.vcp_gpu_image_parts(), 2 * count).slice();
         const parts = Array.from({ length: count }, (_, i) => this.wordsAt(list[2 * i], list[2 * i + 1]));
         return { count: parts.reduce((sum, part) => sum + part.length, 0), parts };
+    }
+    gpuConstants() {
+        return this.wordsAt(this.wasm.vcp_gpu_constants(), this.wasm.vcp_gpu_constants_bytes() / 4);
     }
     /// Says that WebGL has drawn sample 0, what the grid of pixels hit, and the marks of pages, or null.
     gpuEnd({ listens }, grid, marks) {

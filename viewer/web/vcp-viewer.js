@@ -236,7 +236,10 @@ export class VcpViewer extends HTMLElement {
         else if (message.type === 'error') this.fail('scan', message.message);
     }
 
-    show({ width, height, pixels, bitmap, number, samples, update, fetched, memoryBytes, workers, drawnBy, moving, ms }) {
+    show({ width, height, pixels, bitmap, number, samples, update, fetched, memoryBytes, gpuBytes, workers, drawnBy, moving, ms }) {
+        // The other one takes as long as it did at first, for all that is known.
+        if (this.drawnBy !== drawnBy) this.movingScale = kMovingScale;
+        this.drawnBy = drawnBy;
         if (moving) this.movingScale = movingScale(this.movingScale, ms);
         const { canvas } = this.parts;
         if (canvas.width !== width || canvas.height !== height) {
@@ -251,7 +254,7 @@ export class VcpViewer extends HTMLElement {
         this.loading = update.settled ? '' : `Loading, ${(fetched.bytes / 1e6).toFixed(1)} MB`;
         this.showStatus();
         this.drawOver();
-        this.tell('progress', { number, samples, ...update, ...fetched, memoryBytes, workers, drawnBy, ms, width, height });
+        this.tell('progress', { number, samples, ...update, ...fetched, memoryBytes, gpuBytes, workers, drawnBy, ms, width, height });
     }
 
     fit() {
@@ -424,6 +427,8 @@ export class VcpViewer extends HTMLElement {
             }
             tapped = now;
         };
+        // What a browser's GPU process had is gone with it.
+        canvas.addEventListener('contextrestored', () => this.look(false));
         canvas.oncontextmenu = event => event.preventDefault();
         canvas.addEventListener('wheel', event => {
             event.preventDefault();

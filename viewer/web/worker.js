@@ -12,13 +12,14 @@ const kAtOnce = 12, kBytesAtOnce = 1 << 20; // requests, and bytes that they ask
 const kFrameMs = 16; // between frames that nothing else asks for
 const kSamples = 8;          // of a pixel, where a view is at rest
 
+let told = null; // the picture that was said to be settled
 let module, ranges, view = null, awake = null, failed = null, drawn = null, hidden = false, decoding = 0;
 const asked = new Set(); // stretches under way
 let fetched = []; // stretches that came
 const casters = []; // the other workers
 let plan = null; // which bands of the picture are whose
 let costs = []; // milliseconds of each band of the last picture
-let choice, byGpu = false, castMs = 0; // who draws, who the picture at hand, and how long the processor took for its last sample
+let choice, byGpu = false, isAgain = false, castMs = 0; // who draws, who the picture at hand, whether it was shown before, and how long the processor took for its last sample
 
 function post(type, more = {}, transfer = []) {
     self.postMessage({ type, ...more }, transfer);
@@ -131,15 +132,16 @@ function draw(view, update, sample) {
 }
 
 function drawByGpu(view, update, sample) {
-    const began = performance.now(), drawn = choice.draw(view, sample, isShown(sample));
+    const began = performance.now(), drawn = choice.draw(view, sample, isShown(sample), update.settled);
+    if (drawn === undefined) byGpu = false;
     if (!drawn) return drawn === null ? 0 : null;
     if (drawn.picture) show(view, update, sample + 1, { bitmap: drawn.picture }, performance.now() - began);
     return sample + 1;
 }
 
-/// Pictures of 1, 2, 4, 8 samples are.
+/// Pictures of 1, 2, 4, 8 samples are; of one that is there already, the last.
 function isShown(sample) {
-    return (sample + 1 & sample) === 0;
+    return isAgain ? sample === kSamples - 1 : (sample + 1 & sample) === 0;
 }
 
 /// Does it by the processor.
@@ -182,8 +184,8 @@ async function cast(view, update, sample) {
 function show({ width, height, number, moving }, update, samples, picture, ms) {
     const fetched = { requests: ranges.requests, bytes: ranges.bytes }, ready = casters.filter(caster => caster.isReady);
     const memoryBytes = ready.reduce((sum, caster) => sum + caster.memoryBytes, module.memoryBytes());
-    const workers = byGpu ? 1 : 1 + ready.length, drawnBy = byGpu ? 'webgl' : 'processor';
-    post('picture', { width, height, ...picture, number, samples, fetched, update, memoryBytes, workers, drawnBy, moving, ms },
+    const gpuBytes = choice.gpu?.bytes() ?? 0, workers = byGpu ? 1 : 1 + ready.length, drawnBy = byGpu ? 'webgl' : 'processor';
+    post('picture', { width, height, ...picture, number, samples, fetched, update, memoryBytes, gpuBytes, workers, drawnBy, moving, ms },
         [picture.bitmap ?? picture.pixels.buffer]);
     choice.start();
 }
@@ -215,14 +217,19 @@ async function run() {
         if (update.problem) post('problem', { message: update.problem });
         const isNew = drawn?.view !== now || update.changed || update.awaitsRays;
         const isNowGpus = drawn?.view === now && !byGpu && choice.wanted === 'webgl' && choice.isGpus(now);
-        if (update.drawable && !isNew && !byGpu && choice.isOpen(now)) choice.judge(now, castMs);
         if (update.drawable && (isNew || isNowGpus)) {
-            drawn = { view: now, samples: await draw(now, update, 0) };
+            isAgain = !isNew;
+            const samples = await draw(now, update, 0);
+            drawn = samples === null ? null : { view: now, samples };
         } else if (update.settled && !now.moving && drawn?.view === now && drawn.samples < kSamples && now.mode < 3) {
             const samples = await draw(now, update, drawn.samples);
             drawn = samples === null ? null : { view: now, samples: samples === 0 ? kSamples : samples };
         } else if (view === now) {
-            if (update.settled && !now.moving) post('settled', { number: now.number, update });
+            if (update.settled && !now.moving) {
+                if (told !== drawn) post('settled', { number: now.number, update });
+                told = drawn;
+                if (drawn && !byGpu && choice.isOpen(now, castMs)) choice.judge(now, castMs);
+            }
             await new Promise(done => {
                 awake = done;
                 // The policy may need more frames before it lets pages go that were seen a moment ago.

@@ -1,6 +1,6 @@
 // Pictures of WebGL beside those of the processor, in a headless Chromium with SwiftShader: gpu_test.mjs FOLDER PICTURES
 // [rays]. FOLDER: as `vcp publish` makes it, with any scans scan*.vcp and, for the page, plain.vcp. rays: a million rays a
-// view, and no page.
+// view, also with a section, and no page.
 import assert from 'node:assert/strict';
 import fs from 'node:fs';
 import http from 'node:http';
@@ -35,9 +35,12 @@ const kHarness = `
     async function opened(file) {
         const bytes = new Uint8Array(await (await fetch(file)).arrayBuffer()), module = await Module.load(wasm);
         module.begin(bytes.length, file, 256 << 20);
-        module.supply(0, bytes);
-        while (!module.open());
+        module.supply(0, bytes.subarray(0, 64 << 10));
+        while (!module.open()) supplyMissing({ module, bytes });
         return { module, bytes };
+    }
+    function supplyMissing({ module, bytes }) {
+        for (const run of module.missing()) module.supply(run.offset, bytes.subarray(run.offset, run.offset + run.bytes));
     }
     function cast(module, sample) {
         const begun = module.beginSample(sample), depth = new Float32Array(size.width * size.height);
@@ -56,16 +59,36 @@ const kHarness = `
         context.drawImage(image, 0, 0);
         return context.getImageData(0, 0, width, height).data;
     }
-    async function settle({ module, bytes }) {
+    async function settle(scan) {
+        const { module } = scan;
         for (let round = 0; round < 2000; ++round) {
             const update = module.update();
             if (update.problem) throw new Error(update.problem);
             if (update.drawable && update.awaitsRays) cast(module, 0);
             if (update.settled) return;
             for (const jpeg of module.jpegs()) module.putJpeg(jpeg.id, await texelsOf(jpeg));
-            for (const run of module.missing()) module.supply(run.offset, bytes.subarray(run.offset, run.offset + run.bytes));
+            supplyMissing(scan);
         }
         throw new Error('it does not settle');
+    }
+    /// Of the first picture that is listened to, while pages are missing: how many rays of the grid hit something as the
+    /// processor says it, and how many of these hit another page by WebGL.
+    async function heard(scan, view) {
+        const { module } = scan;
+        for (let round = 0; round < 50; ++round) {
+            const update = module.update();
+            if (update.drawable && module.beginSample(0).listens) {
+                cast(module, 0);
+                const said = module.said(), before = 3 + said[0] + said[1], { grid } = await drawn(module, view, 0);
+                const table = module.wordsAt(module.wasm.vcp_gpu_table(), 12 * Math.max(...grid.filter((_, i) => i % 4 === 3)));
+                const others = Array.from({ length: said[2] }, (_, i) => said.subarray(before + 6 * i, before + 6 * i + 6)).filter(hit =>
+                    grid[4 * hit[4] + 3] === 0 || table[12 * (grid[4 * hit[4] + 3] - 1) + 10] !== hit[0]);
+                return { hits: said[2], others: others.length };
+            }
+            if (update.awaitsRays) cast(module, 0);
+            supplyMissing(scan);
+        }
+        return { hits: 0, others: 0 };
     }
     function textOf(bytes) {
         const parts = [];
@@ -79,31 +102,36 @@ const kHarness = `
         const context = canvas.getContext('2d');
         context.drawImage(done.picture, 0, 0);
         const pixels = context.getImageData(0, 0, size.width, size.height).data, { cell } = module.info();
-        const depth = gpu.depths().map(x => x === 0 || x > 1e38 ? Infinity : Math.abs(x) * cell);
-        return { pixels, depth };
+        const depth = gpu.rowsShown(0, size.height).depth.map(x => Math.abs(x) > 1e38 ? Infinity : Math.abs(x) * cell);
+        return { pixels, depth, grid: done.grid };
     }
     window.compare = async (file, views) => {
         const scan = await opened(file), { module } = scan, seen = [];
+        let rays = null;
         for (const { samples = 1, ...more } of views) {
             const orbit = new Orbit(), { boundsMin, boundsMax } = module.info();
             if (more.camera) orbit.fromText(more.camera);
             else orbit.fit(boundsMin, boundsMax, size.width / size.height);
+            if (more.cut) more.section = { normal: [-1, 0, 0], offset: -0.5 * (boundsMin[0] + boundsMax[0]) };
             if (more.nearer) orbit.zoom(more.nearer, 0.1, 0.1);
             const view = { ...size, eye: orbit.eye(), ...orbit.axes(), fov: kFieldOfView, top: [0.2, 0.4, 0.6], bottom: [0.9, 0.8, 0.7], ...more };
             module.look(view);
+            rays ??= await heard(scan, view);
             await settle(scan);
             let theirs, ours;
             for (let sample = 0; sample < samples; ++sample) theirs = cast(module, sample);
             for (let sample = 0; sample < samples; ++sample) ours = await drawn(module, view, sample);
             seen.push([ours, theirs].map(({ pixels, depth }) => ({ pixels: textOf(pixels), depth: textOf(new Uint8Array(depth.buffer)) })));
         }
-        return { seen, cell: module.info().cell };
+        return { seen, rays, cell: module.info().cell };
     };
     window.isThere = true;`;
 const unpacked = text => { const bytes = Buffer.from(text, 'base64'); return new Uint8Array(bytes).buffer; };
 
 async function compare(file, views, tolerance) {
-    const { seen, cell } = await page.evaluate(`compare('${file}', ${JSON.stringify(Object.values(views))})`);
+    const { seen, rays, cell } = await page.evaluate(`compare('${file}', ${JSON.stringify(Object.values(views))})`);
+    console.log(`${file}: of ${rays.hits} rays that the policy hears of, ${rays.others} hit other pages`);
+    assert.ok(rays.hits > 20 && rays.others <= rays.hits / 50);
     return Object.keys(views).map((name, i) => {
         const [ours, theirs] = seen[i].map(({ pixels, depth }) => ({
             pixels: new Uint8ClampedArray(unpacked(pixels)), depth: new Float32Array(unpacked(depth)),
@@ -121,7 +149,7 @@ await page.until('Boolean(window.isThere || window.harnessError)');
 assert.equal(await page.evaluate('window.harnessError ?? null'), null);
 
 const kClose = '1.6,0.2,0.8,1.6,0.2,0.3';
-const kRays = { whole: {}, half: { nearer: 0.5 }, close: { nearer: 0.1 } };
+const kRays = { whole: {}, half: { nearer: 0.5 }, close: { nearer: 0.1 }, cut: { cut: true } };
 const kViews = kind === 'rays' ? kRays : {
     whole: {}, close: { camera: kClose }, 'eight samples': { samples: 8 }, studio: { environment: 1 },
     'shadows and occlusion': { shadows: true, occlusionRays: 8 }, 'light of samples': { camera: kClose, shadows: true, samples: 4 },
@@ -135,24 +163,38 @@ for (const file of fs.readdirSync(folder).filter(name => /^scan.*\.vcp$/.test(na
     }
 assert.deepEqual(page.errors, []);
 
-/// The page draws by WebGL once it can, and by the processor where WebGL's context is lost.
+/// The page draws by WebGL once it can, and by the processor where WebGL's context is lost, or the browser's own process
+/// for graphics.
 async function loses() {
     fs.writeFileSync(path.join(folder, 'webgl.html'), `<!doctype html><style>html, body, vcp-viewer { margin: 0; height: 100%; display: block }</style>
         <script type="module" src="vcp-viewer.js"></script><script>window.seen = [];
         addEventListener('progress', event => seen.push(event.detail)); addEventListener('settled', () => { window.settled = true; });
         addEventListener('error', event => { if (event.detail?.message) window.problem = event.detail.message; });</script>
         <vcp-viewer src="plain.vcp" draw="webgl" workers="1"></vcp-viewer>`);
-    const page = await browser.page(...kSize, false), last = by => `seen.at(-1)?.drawnBy === '${by}' && seen.at(-1).samples === 8`;
+    const page = await browser.page(...kSize, false), last = by => `window.seen?.at(-1)?.drawnBy === '${by}' && seen.at(-1).samples === 8`;
     await page.call('Page.navigate', { url: `${address}webgl.html` });
     await page.until(last('webgl'), 300e3);
     assert.equal(await page.evaluate('seen[0].drawnBy'), 'processor', 'nobody waits for WebGL');
-    const shown = () => page.evaluate(`document.querySelector('vcp-viewer').shadowRoot.querySelector('canvas').toDataURL()`);
+    const shown = async () => new Uint8ClampedArray(unpacked(await page.evaluate(`(() => {
+        const canvas = document.querySelector('vcp-viewer').shadowRoot.querySelector('canvas');
+        const { data } = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
+        return btoa(Array.from(data, x => String.fromCharCode(x)).join(''));
+    })()`)));
     const before = await shown();
-    assert.equal(await page.loseContexts(), 1);
-    await page.evaluate(`settled = false; document.querySelector('vcp-viewer').fit()`);
-    await page.until(last('processor'));
-    const after = await shown();
-    assert.ok(after.length > 5000 && Math.abs(after.length - before.length) < before.length / 50);
+    assert.equal(before.length, 4 * kSize[0] * kSize[1]);
+    for (const lose of [() => page.loseContexts(), () => browser.call('Browser.crashGpuProcess').catch(() => {})]) {
+        await page.evaluate('seen = []');
+        await Promise.race([lose(), new Promise(done => setTimeout(done, 2000))]);
+        await page.evaluate(`document.querySelector('vcp-viewer').fit()`);
+        await page.until(last('processor'));
+        // The canvas of the page may have been lost as well.
+        let differ = before.length;
+        for (const end = Date.now() + 30e3; differ > before.length / 4000 && Date.now() < end;) {
+            await new Promise(done => setTimeout(done, 200));
+            differ = compareColours(await shown(), before, 2).differ;
+        }
+        assert.ok(differ <= before.length / 4000, `${differ} pixels differ once the processor draws again`);
+    }
     assert.equal(await page.evaluate('window.problem ?? null'), null);
     assert.deepEqual(page.errors, []);
 }

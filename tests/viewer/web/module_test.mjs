@@ -355,37 +355,44 @@ function useHostile(module, content) {
 }
 
 await check('WebGL draws once it has shown that it does so rightly, and faster', () => {
-    const view = { width: 320, height: 200, mode: 0 };
-    /// What is chosen where the processor sees `depth`, WebGL `seen(i)` at place i of its grid, after `ms` milliseconds.
-    const chosen = ({ depth = 5, seen = () => depth, ms = 0, drawn = true, of = view }) => {
-        const grid = new Uint32Array(4 * 384), floats = new Float32Array(grid.buffer);
-        for (let i = 0; i < 384; ++i) {
-            floats[4 * i] = seen(i);
-            grid[4 * i + 3] = seen(i) < 1e38 ? 1 : 0;
-        }
-        const draw = () => {
-            for (const end = performance.now() + ms; performance.now() < end;);
-            return drawn ? { grid } : null;
+    const width = 100, rows = 32, count = width * rows, shown = { width, height: 100, mode: 0 };
+    /// What comes of it where the processor sees `depth` and `colour`, and WebGL seen(i) and coloured(i), in `took`
+    /// milliseconds instead of `ms`: 'chosen', 'open' or 'closed'.
+    const judged = ({ depth = 5, colour = 0xff102030, seen = () => depth, coloured = () => colour, ms = 40, took = 0, drawn = true, view = shown }) => {
+        const gpu = {
+            isWrong: false, isClosed: false, isLost() { return this.isWrong; }, isReady: () => true, close() { this.isClosed = true; },
+            draw() {
+                for (const end = performance.now() + took; performance.now() < end;);
+                if (!drawn) throw new RangeError('no memory');
+                return {};
+            },
+            rowsShown: () => ({ colours: Uint32Array.from({ length: count }, (_, i) => coloured(i)), depth: Float32Array.from({ length: count }, (_, i) => seen(i)) }),
         };
-        const gpu = { isLost: () => false, isReady: () => true, draw, closed: 0, close() { ++this.closed; } };
-        const module = { gpuKind: () => ({}), info: () => ({ cell: 2 }), pick: () => (depth < 1e38 ? { depth: 2 * depth } : null) };
-        const choice = Object.assign(new Choice(module, null, () => {}), { gpu });
-        assert.ok(choice.isOpen(of) === (of.mode <= 3) && !choice.isGpus(of));
-        choice.judge(of, 10);
-        assert.ok(!choice.isOpen(of) && gpu.closed === (choice.isGpus(view) ? 0 : 1), 'memory is given back');
-        return choice.isGpus(view);
+        const module = {
+            wasm: {}, gpuKind: () => ({}), info: () => ({ cell: 2 }), beginSample: () => ({ bands: 3, rows }),
+            castBands: () => ({ pixels: new Uint8ClampedArray(Uint32Array.from({ length: count }, () => colour).buffer) }),
+            depth: () => new Float32Array(count).fill(2 * depth),
+        };
+        const choice = Object.assign(new Choice(module, null, () => {}), { gpu, begun: true });
+        assert.ok(!choice.isGpus(view));
+        if (choice.isOpen(view, ms)) choice.judge(view, ms);
+        assert.ok(!choice.isOpen(view, ms), 'a view is judged once');
+        assert.equal(choice.gpu === null, gpu.isClosed, 'what is done without gives its memory back');
+        return choice.isGpus(view) ? 'chosen' : choice.gpu === null ? 'closed' : choice.isOpen({ ...view, mode: 0 }, 40) ? 'open' : 'unknown';
     };
-    const middles = new Set(Array.from({ length: 16 }, (_, i) => 24 * (2 + 4 * Math.floor(i / 4)) + 3 + 6 * (i % 4)));
-    const nth = n => [...middles][n];
-    assert.equal(chosen({}), true);
-    assert.equal(chosen({ depth: Infinity }), true, 'nothing is seen by either');
-    assert.equal(chosen({ seen: i => (i === nth(3) ? 7 : 5) }), true, 'one ray may miss an edge');
-    assert.equal(chosen({ seen: i => (i === nth(3) || i === nth(9) ? 7 : 5) }), false, 'two are wrong');
-    assert.equal(chosen({ seen: i => (i === nth(0) || i === nth(15) ? 3e38 : 5) }), false, 'holes');
-    assert.equal(chosen({ seen: () => 5.002 }), false);
-    assert.equal(chosen({ seen: () => NaN }), false);
-    assert.equal(chosen({ ms: 20 }), false, 'slower');
-    assert.equal(chosen({ drawn: false }), false);
+    assert.equal(judged({}), 'chosen');
+    assert.equal(judged({ seen: i => (i % 200 === 0 ? 3e38 : 5) }), 'chosen', 'edges may differ');
+    assert.equal(judged({ seen: () => -5 }), 'chosen', 'caps of sections');
+    assert.equal(judged({ seen: i => (i % 20 === 0 ? 3e38 : 5) }), 'closed', 'holes');
+    assert.equal(judged({ seen: () => 5.002 }), 'closed');
+    assert.equal(judged({ seen: () => NaN }), 'closed');
+    assert.equal(judged({ coloured: () => 0xff302010 }), 'closed', 'red and blue changed places');
+    assert.equal(judged({ depth: Infinity, seen: () => 5 }), 'closed', 'what is not there is not seen');
+    assert.equal(judged({ depth: Infinity, seen: () => 3.1e38 }), 'open', 'nothing is seen by either');
+    assert.equal(judged({ took: 50 }), 'closed', 'slower');
+    assert.equal(judged({ ms: 10 }), 'open', 'it does not matter');
+    assert.equal(judged({ view: { ...shown, mode: 8 } }), 'open', 'false colours are not drawn');
+    assert.equal(judged({ drawn: false }), 'closed', 'whatever is thrown');
 });
 
 await check('what WebGL draws with: rows are copied once, the table has the cut, and what rays say counts', async () => {

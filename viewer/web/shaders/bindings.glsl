@@ -63,7 +63,9 @@ void storePicture(uint pixel, uint colour) { storedPicture = colour; }
 
 void storeTileStart(uvec2 tile, float start) { storedStart = floatBitsToUint(start); }
 
-// The page that a ray hits is noted last.
-void storeMark(uint record, uint kind) { storedMark = record + 1u; }
+// Pages that are hit are marked from the records of pixels.
+void storeMark(uint record, uint kind) {}
+
+void storeHitPage(uint record, bool found) { storedMark = found ? record + 1u : 0u; }
 
 #include "render/shaders/frame_reads.glsl"

@@ -51,8 +51,8 @@ function fragment(name) {
     const targets = Object.entries(kPasses[name]);
     const outs = targets.map(([target], i) => `layout(location = ${i}) out ${kWide.has(target) ? 'uvec4' : 'uint'} ${target}Out;`);
     const ends = targets.map(([target, value]) => `${target}Out = ${value};`);
-    return `${outs.join('\n')}
-#include "dialect.glsl"
+    return `#include "dialect.glsl"
+${outs.join('\n')}
 ${read(`render/shaders/${name}.comp`).replace('void main()', 'void pass()')}
 ${kMore[name] ?? ''}
 void main() { ${kBefore[name] ?? ''} pass(); ${ends.join(' ')} }`;
@@ -84,7 +84,11 @@ fs.writeFileSync(out, code);
 const { shader } = await import(`data:text/javascript,${encodeURIComponent(code)}`);
 for (const name of kShaders) {
     const file = path.join(folder, name);
-    fs.writeFileSync(file, `#version 300 es\n${shader(name)}\n`);
+    const text = shader(name), highp = text.indexOf('precision highp int');
+    // Whole numbers have 16 bits on phones otherwise.
+    if (name.endsWith('.frag') && !(highp >= 0 && highp < text.search(/\b(u?int|[iu]vec\d)\b(?!;)/)))
+        throw new Error(`${name}: no "precision highp int" before the first whole number`);
+    fs.writeFileSync(file, `#version 300 es\n${text}\n`);
     try {
         execFileSync(glslang, ['--quiet', file], { encoding: 'utf8' });
     } catch (error) {

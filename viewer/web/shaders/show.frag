@@ -1,5 +1,6 @@
 // Shows a picture of words: the canvas has its first row at the bottom.
 precision highp float;
+precision highp int;
 precision highp usampler2D;
 uniform usampler2D shownTexels;
 out vec4 colour;

@@ -47,12 +47,14 @@ RayFeedback feedbackOf(std::span<const glm::uvec4> hits, std::span<const frame::
     const glm::dvec2 grid(frame::kFeedbackWidth, frame::kFeedbackHeight), size(request.width, request.height);
     for (uint32_t ray = 0; ray < hits.size(); ++ray) {
         const uint32_t record = hits[ray].w;
-        if (record == 0 || record > table.size()) continue;
+        const float depth = std::bit_cast<float>(hits[ray].x);
+        // On the cap of a section there is no page.
+        if (record == 0 || record > table.size() || !(depth >= 0)) continue;
         const glm::dvec2 part(ray % frame::kFeedbackWidth, ray / frame::kFeedbackWidth);
         addTo(feedback, dataset, rays,
               {.ray = ray,
                .page = table[record - 1].colours.entry,
-               .depth = std::abs(double(std::bit_cast<float>(hits[ray].x))) * dataset.header.cell,
+               .depth = double(depth) * dataset.header.cell,
                .point = glm::floor((part + 0.5) * size / grid) + 0.5});
     }
     return feedback;

@@ -43,8 +43,8 @@ struct GpuConstants {
 };
 GpuConstants gpuConstants(const FrameRequest& request, const Residency& residency);
 
-/// Returns what the rays of a grid over the picture met. `hits`: of each, depth (bits of a float), two words more, and
-/// the number of the page's record in the table plus 1, or 0.
+/// Returns what the rays of a grid over the picture met. `hits`: of each, depth in finest cells (bits of a float;
+/// negative on the cap of a section), two words more, and the number of the page's record in the table plus 1, or 0.
 RayFeedback feedbackOf(std::span<const glm::uvec4> hits, std::span<const frame::TableRecord> table,
                        const Dataset& dataset, const FrameRequest& request);
 

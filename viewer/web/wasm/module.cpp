@@ -65,6 +65,7 @@ struct GpuFrame {
     PoolMirror mirror;
     std::vector<MirroredRows> rows;
     std::vector<frame::TableRecord> table;
+    uint64_t version = 0;  // of the table
     frame::FrameConstants constants;
     std::vector<uint32_t> background;
     std::shared_ptr<const ImageSet> images;
@@ -403,22 +404,23 @@ EXPORT(vcp_gpu_kind) const double* vcp_gpu_kind() {
 }
 
 /// Begins a sample that WebGL draws, as vcp_begin_sample() does. Returns 1; 0 where the cut is not the picture's any
-/// more. vcp_numbers() are then: the number of vcp_gpu_rows(), the rows that the texture of the pool must have, records
-/// of the table, a number of the table, whether rays are asked which pages they hit, and where, and a number of the
-/// images, 0 where none are shown.
+/// more. vcp_numbers() are then: the number of vcp_gpu_rows(), the rows that the texture of the pool must have, and
+/// will have at most, records of the table, a number of the table, whether rays are asked which pages they hit, and
+/// where, and a number of the images, 0 where none are shown.
 EXPORT(vcp_gpu_begin) int vcp_gpu_begin(int sample) {
     const auto frame = frameOf(uint32_t(sample));
     if (!frame) return notBegun(frame.error());
     GpuFrame& gpu = opened.gpu;
     opened.view = selectionView(frame->request);
     gpu.rows = gpu.mirror.rowsToCopy(residency());
-    gpu.table = residency().table();
+    if (gpu.table.empty() || gpu.version != residency().version()) gpu.table = residency().table();
+    gpu.version = residency().version();
     gpu.constants = frameConstants(frame->request, opened.dataset.get(), 1, opened.hasColour, frame->errorPixels);
-    gpu.constants.firstHitMark = 1;
     gpu.constants.partRows = frame->request.height;
     gpu.background = backgroundRows(frame->request);
     const double numbers[] = {double(gpu.rows.size()),
                               double(gpu.mirror.rows()),
+                              double(opened.budgetBytes / kPoolUnitBytes),
                               double(gpu.table.size()),
                               double(residency().version()),
                               frame->asksRays ? 1.0 : 0.0,
@@ -430,6 +432,7 @@ EXPORT(vcp_gpu_begin) int vcp_gpu_begin(int sample) {
 EXPORT(vcp_gpu_rows) const MirroredRows* vcp_gpu_rows() { return opened.gpu.rows.data(); }
 EXPORT(vcp_gpu_table) const frame::TableRecord* vcp_gpu_table() { return opened.gpu.table.data(); }
 EXPORT(vcp_gpu_constants) const frame::FrameConstants* vcp_gpu_constants() { return &opened.gpu.constants; }
+EXPORT(vcp_gpu_constants_bytes) int vcp_gpu_constants_bytes() { return sizeof(frame::FrameConstants); }
 /// The picture's background, RGBA8 of each row.
 EXPORT(vcp_gpu_background) const uint32_t* vcp_gpu_background() { return opened.gpu.background.data(); }
 /// Prepares the words of the images (ImageWords). Returns of how many vcp_gpu_image_parts() they are.
