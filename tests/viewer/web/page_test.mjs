@@ -1,6 +1,7 @@
-// A published page in headless Chromium: page_test.mjs VCP FOLDER PICTURES [images]
+// A published page in headless Chromium: page_test.mjs VCP FOLDER PICTURES [images|shards]
 // FOLDER: as `vcp publish` makes it. PICTURES: folder for what is seen. images: the scan is textured_scene.mjs', without
-// loss, and the folder has it with JPEGs as well, as jpeg.vcp; what concerns images is tested.
+// loss, and the folder has it with JPEGs as well, as jpeg.vcp; what concerns images is tested. shards: the scan is in shards,
+// and the folder has it as the one file as well, as whole.vcp.
 import assert from 'node:assert/strict';
 import { execFileSync, spawn } from 'node:child_process';
 import fs from 'node:fs';
@@ -253,6 +254,41 @@ async function missesTile() {
     await page.close();
 }
 
+/// A scan in shards is seen as the one file is; of a shard that the server lost one line tells, and the rest is shown.
+async function showsShards() {
+    const views = [], bytes = [];
+    for (const file of ['scan.vcp', 'whole.vcp']) {
+        const page = await open(640, 400), seen = [];
+        await change(page, `viewer.src = '${file}?anew'; viewer.info = state.first = null`);
+        await page.until('viewer.info !== null && Boolean(state.settled)');
+        const first = await page.evaluate('state.first');
+        assert.ok(first.requests <= 3 && first.bytes <= 400e3, `${first.requests} requests, ${first.bytes} bytes to the first picture`);
+        for (const camera of Object.values(kCameras)) {
+            await change(page, `viewer.camera = '${camera.join(',')}'`);
+            seen.push(await shown(page));
+        }
+        views.push(seen);
+        bytes.push(`${file}: first picture ${first.requests} requests, ${first.bytes} bytes; settled ${await page.evaluate('state.last.requests')} requests, ` +
+            `${await page.evaluate('state.last.bytes')} bytes`);
+        await closeGood(page);
+    }
+    console.log(bytes.join('\n'));
+    assert.deepEqual(views[0], views[1]);
+    assert.notEqual(views[0][0], views[0][1]);
+    // The largest shard is none that a first picture needs: that has coarse pages.
+    const shards = fs.readdirSync(folder).filter(name => /^[0-9a-f]{32}\.vcp$/.test(name)), size = name => fs.statSync(path.join(folder, name)).size;
+    const [lost] = shards.sort((a, b) => size(b) - size(a));
+    assert.ok(shards.length >= 4);
+    fs.renameSync(path.join(folder, lost), path.join(pictures, 'lost.vcp'));
+    const page = await open(640, 400, { link: '?lost' });
+    await page.until('Boolean(state.problem)');
+    assert.match(await page.evaluate('state.problem'), new RegExp(lost));
+    await page.until('Boolean(state.settled)');
+    assert.ok((await shown(page)).length > 10000);
+    fs.renameSync(path.join(pictures, 'lost.vcp'), path.join(folder, lost));
+    await page.close();
+}
+
 const kCameras = { whole: [0, 0.86, 0, 8, 0.5, 0.4], close: [0, 1.1, 0, 1.6, 0.3, 0.35] };
 /// The depth of each pixel and two measured points, against those of the program; a link leads to the same picture.
 async function measures(name, width, height) {
@@ -490,7 +526,9 @@ async function step(run, ...all) {
     console.log(`   ${[run.name, ...all].join(' ')}: ${((performance.now() - began) / 1e3).toFixed(1)} s`);
 }
 
-if (kind === 'images') {
+if (kind === 'shards') {
+    await step(showsShards);
+} else if (kind === 'images') {
     for (const run of [sharpens, sharesImages, missesTile]) await step(run);
 } else if (scan.length > 512 << 10) {
     // Of the larger scans, whose pages outnumber a small budget.

@@ -22,6 +22,11 @@ for triangles in 10000 60000 300000; do
     mkdir "pictures$triangles"
     "$node" "$here/page_test.mjs" "$vcp" "site$triangles" "pictures$triangles"
 done
+"$vcp" shard scan.vcp -o shards --size 64K --progress none >/dev/null
+"$vcp" publish shards -o siteshards --viewer "$web" >/dev/null
+cp scan.vcp siteshards/whole.vcp
+mkdir picturesshards
+"$node" "$here/page_test.mjs" "$vcp" siteshards picturesshards shards
 "$node" "$here/textured_scene.mjs" . 200 1024
 "$vcp" build textured.obj -o scan.vcp --colour-quality lossless --overwrite --progress none
 "$vcp" publish scan.vcp -o siteimages --viewer "$web" >/dev/null
