@@ -36,7 +36,7 @@ export class Gpu {
         return new Gpu(canvas, gl);
     }
     constructor(canvas, gl) {
-        Object.assign(this, { canvas, gl, programs: new Map(), kinds: new Map(), targets: {}, size: [0, 0], layers: 0, imageBytes: 0, imagesAt: -kImagesMs, isWrong: false });
+        Object.assign(this, { canvas, gl, programs: new Map(), kinds: new Map(), targets: {}, size: [0, 0], room: [0, 0], layers: 0, imageBytes: 0, imagesAt: -kImagesMs, isWrong: false });
         this.parallel = gl.getExtension('KHR_parallel_shader_compile');
         this.frames = gl.createBuffer();
         this.empty = this.texture(1, 1, false);
@@ -91,16 +91,17 @@ export class Gpu {
         this.gl.deleteFramebuffer(framebuffer);
         for (const { texture } of parts) this.gl.deleteTexture(texture);
     }
-    /// Makes the targets that a picture needs, and lets go those of another size.
+    /// Makes the targets that a picture needs; those that are larger stay, for the size follows whether a view moves.
     resize(width, height, { colour, light }, adds) {
-        const hasChannels = colour === 3;
-        if (this.size[0] !== width || this.size[1] !== height) {
+        const hasChannels = colour === 3, room = [Math.max(width, this.room[0]), Math.max(height, this.room[1])];
+        this.size = [width, height];
+        if (room[0] > this.room[0] || room[1] > this.room[1]) {
             Object.values(this.targets).forEach(target => this.release(target));
             this.targets = {};
-            this.size = [width, height];
+            this.room = room;
         }
-        const make = (name, ...wide) => { this.targets[name] ??= this.target(width, height, ...wide); };
-        this.targets.starts ??= this.target(Math.ceil(width / 8), Math.ceil(height / 8), false);
+        const make = (name, ...wide) => { this.targets[name] ??= this.target(...room, ...wide); };
+        this.targets.starts ??= this.target(...this.tilesOf(room), false);
         // Where the kind of hits changes, the target does.
         if (this.targets.hits && (this.targets.hits.parts.length === 2) !== hasChannels) {
             this.release(this.targets.hits);
@@ -194,8 +195,11 @@ export class Gpu {
 
     // What is drawn.
 
-    /// Draws to a target; of more than so many pixels, in several calls.
-    run({ program }, { framebuffer, width, height }) {
+    tilesOf([width, height]) {
+        return [Math.ceil(width / 8), Math.ceil(height / 8)];
+    }
+    /// Draws to a part of a target from its first texel on; of more than so many pixels, in several calls.
+    run({ program }, { framebuffer }, [width, height] = this.size) {
         const { gl } = this, step = Math.max(8, Math.floor(kMostPixels / width / 8) * 8);
         gl.useProgram(program);
         gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
@@ -317,7 +321,7 @@ export class Gpu {
     /// Draws a sample as large as the targets are; returns the texture that shows it, or the mean of it and those before.
     passes(kind, programs, sample) {
         const { starts, hits, light, first, more } = this.targets, part = sample === 0 ? first : more;
-        this.run(programs.beam, starts);
+        this.run(programs.beam, starts, this.tilesOf(this.size));
         this.bind(kUnits.tileStartTexels, starts.parts[0].texture);
         this.run(programs.trace, hits);
         this.bind(kUnits.hitTexels, hits.parts[0].texture);
@@ -339,11 +343,12 @@ export class Gpu {
         this.run(program, to);
         return to.parts[1];
     }
-    show({ program }, { texture, width, height }) {
-        const { gl, canvas } = this;
+    show({ program }, { texture }) {
+        const { gl, canvas, size: [width, height] } = this;
         if (canvas.width !== width || canvas.height !== height) canvas.width = width, canvas.height = height;
         this.bind(kUnits.shownTexels, texture);
         gl.useProgram(program);
+        gl.uniform2i(gl.getUniformLocation(program, 'size'), width, height);
         gl.bindFramebuffer(gl.FRAMEBUFFER, null);
         gl.viewport(0, 0, width, height);
         gl.drawArrays(gl.TRIANGLES, 0, 3);
@@ -352,17 +357,19 @@ export class Gpu {
     drawGrid(made) {
         this.gl.useProgram(made.program);
         this.gl.uniform2i(this.gl.getUniformLocation(made.program, 'grid'), ...kGrid);
-        this.run(made, this.grid);
+        this.gl.uniform2i(this.gl.getUniformLocation(made.program, 'size'), ...this.size);
+        this.run(made, this.grid, kGrid);
     }
     /// Waits until all is drawn.
     readGrid(made) {
         this.drawGrid(made);
-        return this.read(this.grid, 0, kGrid[1]);
+        return this.read(this.grid, kGrid[0], 0, kGrid[1]);
     }
     drawMarks({ program }) {
         const { gl } = this, { framebuffer, width, height } = this.marksTarget, points = this.size[0] * this.size[1];
         gl.useProgram(program);
         gl.uniform2f(gl.getUniformLocation(program, 'size'), width, height);
+        gl.uniform1i(gl.getUniformLocation(program, 'width'), this.size[0]);
         gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
         gl.viewport(0, 0, width, height);
         gl.clearBufferuiv(gl.COLOR, 0, [0, 0, 0, 0]);
@@ -373,11 +380,11 @@ export class Gpu {
     }
     readMarks(made, { records }) {
         this.drawMarks(made);
-        const words = this.read(this.marksTarget, 0, this.marksTarget.height);
+        const words = this.read(this.marksTarget, kRowTexels, 0, this.marksTarget.height);
         return Uint32Array.from({ length: records }, (_, i) => words[4 * i]);
     }
-    /// Returns rows of a target's first texture, four words a texel.
-    read({ framebuffer, width }, first, count) {
+    /// Returns rows of a target's first texture, up to a width; four words a texel.
+    read({ framebuffer }, width, first, count) {
         const { gl } = this, words = new Uint32Array(4 * width * count).fill(kUnread);
         gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
         gl.readPixels(0, first, width, count, gl.RGBA_INTEGER, gl.UNSIGNED_INT, words);
@@ -386,7 +393,8 @@ export class Gpu {
     /// Returns what rows of the picture drawn last show in its first sample: colours, RGBA8, and depths in cells, below 0
     /// on the cap of a section and 3e38 or more where nothing is hit.
     rowsShown(first, count) {
-        const depths = new Float32Array(this.read(this.targets.hits, first, count).buffer), words = this.read(this.targets.first, first, count);
+        const depths = new Float32Array(this.read(this.targets.hits, this.size[0], first, count).buffer);
+        const words = this.read(this.targets.first, this.size[0], first, count);
         const every = (array, from) => array.map((_, i) => from[4 * i]);
         return { colours: every(new Uint32Array(words.length / 4), words), depth: every(new Float32Array(words.length / 4), depths) };
     }

@@ -3,9 +3,9 @@ precision highp float;
 precision highp usampler2D;
 uniform usampler2D hitTexels;
 uniform vec2 size;  // of the target
+uniform int width;  // of the picture
 
 void main() {
-    int width = textureSize(hitTexels, 0).x;
     uint mark = texelFetch(hitTexels, ivec2(gl_VertexID % width, gl_VertexID / width), 0).w;
     vec2 place = vec2(float(mark - 1u & 1023u), float(mark - 1u >> 10)) + 0.5;
     gl_Position = mark == 0u ? vec4(2.0, 2.0, 2.0, 1.0) : vec4(place / size * 2.0 - 1.0, 0.0, 1.0);
