@@ -247,6 +247,13 @@ Caps capsOf(const FrameRequest& request, const Dataset& dataset) {
     return request.sectionCaps == Caps::Closed && !dataset.hasOpenParts() ? Caps::All : request.sectionCaps;
 }
 
+SectionKind sectionKind(const FrameRequest& request, Caps caps) {
+    if (request.sections.empty()) return SectionKind::None;
+    return caps == Caps::None     ? SectionKind::Open
+           : caps == Caps::Closed ? SectionKind::ClosedCapped
+                                  : SectionKind::Capped;
+}
+
 std::vector<uint32_t> backgroundRows(const FrameRequest& request) {
     const Shading& shading = request.shading;
     std::vector<uint32_t> rows(request.height);

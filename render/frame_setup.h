@@ -38,6 +38,11 @@ bool castsShadows(const Shading& shading);
 /// Returns how what planes cut open of a dataset is filled. Caps::Closed is for those that have open parts, and say so.
 Caps capsOf(const FrameRequest& request, const Dataset& dataset);
 
+/// Whether section planes cut, and what of what they cut open is filled: all of it, or closed parts (trace.comp).
+enum class SectionKind : uint32_t { None, Open, Capped, ClosedCapped };
+/// `caps`: capsOf(), of a dataset.
+SectionKind sectionKind(const FrameRequest& request, Caps caps);
+
 /// Words that a pixel's hit takes: depth, normal, and where wanted colour, and light or the value of a false colour.
 uint32_t hitPlanes(const FrameRequest& request, bool colour);
 

@@ -67,6 +67,11 @@ std::vector<uint64_t> CutScene::marked(const PageMarks& marks) const {
     return pages;
 }
 
+glm::ivec2 probedPixel(uint32_t ray, glm::ivec2 size) {
+    const glm::dvec2 part(ray % frame::kFeedbackWidth, ray / frame::kFeedbackWidth);
+    return {(part + 0.5) * glm::dvec2(size) / glm::dvec2(frame::kFeedbackWidth, frame::kFeedbackHeight)};
+}
+
 void addTo(RayFeedback& feedback, const Dataset& dataset, const PictureRays& rays, const ProbedHit& hit) {
     const glm::dvec3 origin = dataset.originOf(dataset.pages[0]);
     const double rootEdge = dataset.edgeOf(dataset.pages[0]), unit = std::ldexp(rootEdge, -int(frame::kLatticeBits));
@@ -80,10 +85,8 @@ void addTo(RayFeedback& feedback, const Dataset& dataset, const PictureRays& ray
 
 RayFeedback feedbackOf(const HostLayer& layer, const Dataset& dataset, const HostPicture& picture, RowsOfWhole rows) {
     RayFeedback feedback;
-    const glm::dvec2 size(picture.size.x, rows.wholeHeight), grid(frame::kFeedbackWidth, frame::kFeedbackHeight);
     for (uint32_t ray = 0; ray < frame::kFeedbackRays; ++ray) {
-        const glm::dvec2 part(ray % frame::kFeedbackWidth, ray / frame::kFeedbackWidth);
-        glm::ivec2 pixel((part + 0.5) * size / grid);
+        glm::ivec2 pixel = probedPixel(ray, {picture.size.x, rows.wholeHeight});
         if (pixel.y < rows.begin || pixel.y >= rows.end) continue;
         pixel.y -= rows.first;
         const size_t at = size_t(pixel.y) * size_t(picture.size.x) + size_t(pixel.x);

@@ -50,6 +50,9 @@ struct RowsOfWhole {
     int wholeHeight = 0;
 };
 
+/// Returns the pixel of a picture that a ray of a grid of 24 x 16 goes through: the middle of its part.
+glm::ivec2 probedPixel(uint32_t ray, glm::ivec2 size);
+
 /// A point of a picture that rays hit a page in.
 struct ProbedHit {
     uint32_t ray = 0;   ///< of the grid over the whole picture

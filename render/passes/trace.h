@@ -3,12 +3,10 @@
 // barrierComputeToCompute, recorded here.
 #pragma once
 
+#include "render/frame_setup.h"
 #include "render/passes/frame_resources.h"
 
 namespace vcp {
-
-/// Whether section planes cut, and what of what they cut open is filled: all of it, or closed parts.
-enum class SectionKind : uint32_t { None, Open, Capped, ClosedCapped };
 
 class TracePass {
 public:

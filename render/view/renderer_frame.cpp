@@ -107,17 +107,6 @@ Result<void> Renderer::View::prepare(Frame& frame, size_t i) {
     return choosePipelines(frame, i);
 }
 
-namespace {
-
-SectionKind sectionKind(const FrameRequest& request, Caps caps) {
-    if (request.sections.empty()) return SectionKind::None;
-    return caps == Caps::None     ? SectionKind::Open
-           : caps == Caps::Closed ? SectionKind::ClosedCapped
-                                  : SectionKind::Capped;
-}
-
-}  // namespace
-
 Result<void> Renderer::View::choosePipelines(Frame& frame, size_t i) {
     const Layer& layer = layers[i];
     LayerFrame& drawing = frame.layers[i];

@@ -8,7 +8,7 @@ import { shader } from './shaders.js';
 
 const kRowTexels = 1024, kLayerRows = 1024; // of a texture of rows
 const kOwnUnit = 15; // where textures are made
-export const kGrid = [24, 16]; // pixels that say what they hit
+const kGrid = [24, 16]; // pixels that say what they hit
 const kUnread = 0xfffffffe; // what stands where a lost context has read nothing: no record or mark
 const kImagesMs = 500; // between copies of images, while more come
 const kMostPixels = 1 << 18; // of one call: what takes seconds would end the context
@@ -54,24 +54,23 @@ export class Gpu {
 
     // Textures and targets.
 
+    /// A texture without a size, bound where textures are made.
+    unfiltered(kind) {
+        const { gl } = this, texture = gl.createTexture();
+        this.bind(kOwnUnit, texture, kind);
+        for (const filter of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(kind, filter, gl.NEAREST);
+        return texture;
+    }
     /// `isWide`: of four words a texel, else of one.
     texture(width, height, isWide, words = null) {
-        const { gl } = this, texture = gl.createTexture();
-        gl.activeTexture(gl.TEXTURE0 + kOwnUnit);
-        gl.bindTexture(gl.TEXTURE_2D, texture);
-        gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.NEAREST);
-        gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, gl.NEAREST);
+        const { gl } = this, texture = this.unfiltered(gl.TEXTURE_2D);
         gl.texStorage2D(gl.TEXTURE_2D, 1, isWide ? gl.RGBA32UI : gl.R32UI, width, height);
         if (words) gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, width, height, isWide ? gl.RGBA_INTEGER : gl.RED_INTEGER, gl.UNSIGNED_INT, words);
         return { texture, width, height };
     }
     /// A texture of rows, in layers.
     rows(layers, height = kLayerRows) {
-        const { gl } = this, texture = gl.createTexture();
-        gl.activeTexture(gl.TEXTURE0 + kOwnUnit);
-        gl.bindTexture(gl.TEXTURE_2D_ARRAY, texture);
-        gl.texParameteri(gl.TEXTURE_2D_ARRAY, gl.TEXTURE_MIN_FILTER, gl.NEAREST);
-        gl.texParameteri(gl.TEXTURE_2D_ARRAY, gl.TEXTURE_MAG_FILTER, gl.NEAREST);
+        const { gl } = this, texture = this.unfiltered(gl.TEXTURE_2D_ARRAY);
         gl.texStorage3D(gl.TEXTURE_2D_ARRAY, 1, gl.RGBA32UI, kRowTexels, height, layers);
         return texture;
     }
@@ -181,7 +180,8 @@ export class Gpu {
     /// what is signalled when it is through.
     warm(module, kind, programs) {
         const { gl } = this;
-        this.copyAll(module, this.begin(module, 0), 8, false);
+        this.copyAll(module, this.begin(module, 0), false);
+        this.copyBackground(module, 8);
         this.resize(8, 8, kind, true);
         this.passes(kind, programs, 0);
         const shown = this.passes(kind, programs, 1);
@@ -212,11 +212,13 @@ export class Gpu {
         }
         gl.disable(gl.SCISSOR_TEST);
     }
-    copyAll(module, begun, height, isSettled) {
+    copyAll(module, begun, isSettled) {
         this.copyRows(module, begun);
         this.copyTable(module, begun);
         this.copyImages(module, begun, isSettled);
-        this.copyFrame(module, height);
+        this.gl.bindBuffer(this.gl.UNIFORM_BUFFER, this.frames);
+        this.gl.bufferData(this.gl.UNIFORM_BUFFER, module.gpuConstants(), this.gl.DYNAMIC_DRAW);
+        this.gl.bindBufferBase(this.gl.UNIFORM_BUFFER, 0, this.frames);
     }
     copyRows(module, begun) {
         const { gl } = this;
@@ -276,12 +278,9 @@ export class Gpu {
         this.imageBytes = 4 * count;
         if (images !== 0) module.wasm.vcp_gpu_images_end();
     }
-    copyFrame(module, height) {
-        const { gl } = this;
-        gl.bindBuffer(gl.UNIFORM_BUFFER, this.frames);
-        gl.bufferData(gl.UNIFORM_BUFFER, module.gpuConstants(), gl.DYNAMIC_DRAW);
-        gl.bindBufferBase(gl.UNIFORM_BUFFER, 0, this.frames);
-        gl.deleteTexture(this.background?.texture ?? null);
+    /// The background is that of all samples of a picture.
+    copyBackground(module, height) {
+        this.gl.deleteTexture(this.background?.texture ?? null);
         this.background = this.texture(1, height, false, module.wordsAt(module.wasm.vcp_gpu_background(), height));
         this.bind(kUnits.rowColours, this.background.texture);
     }
@@ -308,7 +307,8 @@ export class Gpu {
         const begun = this.begin(module, sample);
         const programs = begun && this.programsOf(begun, sample > 0);
         if (!programs) return null;
-        this.copyAll(module, begun, height, isSettled);
+        this.copyAll(module, begun, isSettled);
+        if (sample === 0) this.copyBackground(module, height);
         this.resize(width, height, begun, sample > 0);
         const shown = this.passes(begun, programs, sample), grid = this.readGrid(programs.probe);
         const marks = sample === 0 && begun.asksRays ? this.readMarks(programs.marks, begun) : null;

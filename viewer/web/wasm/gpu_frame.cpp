@@ -32,10 +32,7 @@ GpuConstants gpuConstants(const FrameRequest& request, const Residency& residenc
     GpuConstants constants;
     if (residency.hasColour()) constants.colour = 1;
     if (residency.images()) constants.colour = showsChannels(residency, request) ? 3 : 2;
-    if (!request.sections.empty()) {
-        const Caps caps = capsOf(request, residency.dataset());
-        constants.sections = caps == Caps::None ? 1 : caps == Caps::Closed ? 3 : 2;
-    }
+    constants.sections = uint32_t(sectionKind(request, capsOf(request, residency.dataset())));
     constants.light = hasLight(request.shading) ? 1 : 0;
     return constants;
 }
@@ -44,18 +41,16 @@ RayFeedback feedbackOf(std::span<const glm::uvec4> hits, std::span<const frame::
                        const Dataset& dataset, const FrameRequest& request) {
     RayFeedback feedback;
     const PictureRays rays = pictureRays(request);
-    const glm::dvec2 grid(frame::kFeedbackWidth, frame::kFeedbackHeight), size(request.width, request.height);
     for (uint32_t ray = 0; ray < hits.size(); ++ray) {
         const uint32_t record = hits[ray].w;
         const float depth = std::bit_cast<float>(hits[ray].x);
         // On the cap of a section there is no page.
         if (record == 0 || record > table.size() || !(depth >= 0)) continue;
-        const glm::dvec2 part(ray % frame::kFeedbackWidth, ray / frame::kFeedbackWidth);
         addTo(feedback, dataset, rays,
               {.ray = ray,
                .page = table[record - 1].colours.entry,
                .depth = double(depth) * dataset.header.cell,
-               .point = glm::floor((part + 0.5) * size / grid) + 0.5});
+               .point = glm::dvec2(probedPixel(ray, {request.width, request.height})) + 0.5});
     }
     return feedback;
 }
