@@ -71,7 +71,7 @@ std::optional<uint32_t> findVertex(const LatticeMesh& mesh, glm::i32vec3 p);
 void computeNormals(LatticeMesh& mesh);
 
 /// Own normals that are within so many degrees of the computed ones count as these, and cost nothing in the file.
-inline constexpr double kSettledDegrees = 2;
+inline constexpr double kSettledDegrees = 0.4;
 
 /// Drops the mesh's own normals at corners where they are near the vertex' computed normal or, at a crease, near the
 /// triangle's. Uses the calling arena's threads.

@@ -101,7 +101,7 @@ TEST(MeshOf, OwnNormalsStayWithTheirCorners) {
     EXPECT_TRUE(meshOf(std::vector{second}, false).cornerNormals.empty());
 }
 
-TEST(SettleNormals, KeepsWhatIsTwoDegreesFromTheComputed) {
+TEST(SettleNormals, KeepsWhatIsFarFromTheComputed) {
     // A roof of two slopes, whose ridge is a crease, and a flat beside it.
     const glm::i32vec3 p[] = {{0, 0, 0}, {900, 0, 900}, {0, 900, 0}, {1800, 0, 0}, {900, 900, 900}};
     const std::vector<LatticeTriangle> soup{latticeTriangle(p[0], p[1], p[2]), latticeTriangle(p[1], p[4], p[2]),
@@ -110,12 +110,13 @@ TEST(SettleNormals, KeepsWhatIsTwoDegreesFromTheComputed) {
         const double a = glm::radians(45 + degrees);
         return packDirection({-std::sin(a), 0, std::cos(a)});
     };
-    for (const double degrees : {0.0, 1.8, -1.8, 2.2, -2.2, 60.0}) {
+    constexpr double kNear = 0.8 * kSettledDegrees, kFar = 1.2 * kSettledDegrees;
+    for (const double degrees : {0.0, kNear, -kNear, kFar, -kFar, 60.0}) {
         LatticeMesh mesh = meshOf(soup, false);
         computeNormals(mesh);
         mesh.cornerNormals.assign(3, {leaning(degrees), kUnknownNormal, leaning(degrees)});
         const auto own = mesh.cornerNormals;
-        const bool counts = std::abs(degrees) > 2;
+        const bool counts = std::abs(degrees) > kSettledDegrees;
         settleNormals(mesh);
         ASSERT_EQ(mesh.cornerNormals.empty(), false) << "the other slope's";
         size_t ofSlope = 0;
@@ -132,7 +133,7 @@ TEST(SettleNormals, KeepsWhatIsTwoDegreesFromTheComputed) {
     }
     LatticeMesh mesh = meshOf(std::span(soup).first(2), false);
     computeNormals(mesh);
-    mesh.cornerNormals.assign(2, {leaning(0), leaning(1), kUnknownNormal});
+    mesh.cornerNormals.assign(2, {leaning(0), leaning(kNear), kUnknownNormal});
     settleNormals(mesh);
     EXPECT_TRUE(mesh.cornerNormals.empty()) << "none is left";
 }
