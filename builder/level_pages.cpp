@@ -42,10 +42,11 @@ Result<BuiltPage> storedPage(const LevelSettings& settings, const LatticeMesh& m
 }
 
 Result<BuiltPage> buildPage(const LevelSettings& settings, const LatticeMesh& mesh, uint64_t code,
-                            std::span<const uint32_t> triangles, bool withSurface) {
+                            std::span<const uint32_t> triangles, bool withSurface, size_t mostPieces) {
     VCP_TRY_ASSIGN(auto page, storedPage(settings, mesh, code, triangles));
     if (withSurface)
-        page.surface = storedSurface(surfaceOf(mesh, triangles, mortonDecode(code), settings.grid.log2Cells));
+        page.surface =
+            storedSurface(surfaceOf(mesh, triangles, mortonDecode(code), settings.grid.log2Cells, mostPieces));
     return page;
 }
 
@@ -75,22 +76,70 @@ Extents extentsOf(const LatticeMesh& mesh, std::span<const uint32_t> triangles, 
     return sum;
 }
 
-// Where a page's triangles have images or normals of their own, each takes so much more: its vertices may all be its
-// own, with their places.
-constexpr uint64_t kOwnVerticesWorkBytes = 150;
+/// Returns how many vertices a page of these triangles may have: where they have images or normals of their own, each
+/// of its own places and normals makes one.
+uint64_t mostVertices(const LatticeMesh& mesh, std::span<const uint32_t> triangles) {
+    if (!mesh.textures.empty() || !mesh.cornerNormals.empty() || triangles.empty()) return 3 * triangles.size();
+    uint32_t least = UINT32_MAX, most = 0;
+    for (const uint32_t k : triangles)
+        for (const uint32_t v : mesh.triangles[k]) {
+            least = std::min(least, v);
+            most = std::max(most, v);
+        }
+    std::vector<bool> seen(size_t{most} - least + 1);
+    for (const uint32_t k : triangles)
+        for (const uint32_t v : mesh.triangles[k]) seen[v - least] = true;
+    return uint64_t(std::ranges::count(seen, true));
+}
 
-/// Returns the memory to build a page of these triangles: its bytes first, then the surface in it.
-uint64_t workOf(const LevelSettings& settings, const LatticeMesh& mesh, std::span<const uint32_t> triangles,
-                bool withSurface) {
+/// What a page takes while it is built: its bytes first, then its surface, which is cut in parts of so many pieces.
+struct PageWork {
+    uint64_t bytes = 0;
+    size_t pieces = kMostPieces;
+};
+
+/// Foretells the work of a page of these triangles.
+PageWork foretoldWork(const LevelSettings& settings, const LatticeMesh& mesh, std::span<const uint32_t> triangles,
+                      bool withSurface) {
     const uint64_t count = triangles.size();
-    const bool hasOwn = !mesh.textures.empty() || !mesh.cornerNormals.empty();
-    const uint64_t exact = exactPageWorkBytes(count) + (hasOwn ? kOwnVerticesWorkBytes * count : 0);
-    if (settings.exact && !withSurface) return exact;
+    const auto records = uint64_t(kMostRepetition * double(count));
+    const uint64_t exact = settings.exact ? exactPageWorkBytes(count, mostVertices(mesh, triangles), records) : 0;
+    if (settings.exact && !withSurface) return {exact};
     const double margin = settings.exact ? kExactMarginCells : kBinMarginCells;
     const Extents extents = extentsOf(mesh, triangles, settings.grid.edgeCells() + 2 * margin);
-    if (settings.exact) return std::max(exact, surfaceWorkBytes(count, extents.area, extents.perimeter));
+    if (settings.exact) return {std::max(exact, surfaceWorkBytes(count, extents.area, extents.perimeter))};
     // The cells that a flat shape touches: its area over three axes, its rim, and those of its corners.
-    return pageWorkBytes(count, uint64_t(1.75 * extents.area + 1.5 * extents.perimeter + 4 * double(count)));
+    return {pageWorkBytes(count, uint64_t(1.75 * extents.area + 1.5 * extents.perimeter + 4 * double(count)))};
+}
+
+/// Counts the work of a page of the finest level, for which what is foretold is too much: its leaves may name triangles
+/// less often than they can, three to four times in scans, and its surface may be cut in smaller parts.
+PageWork countedWork(const LevelSettings& settings, const LatticeMesh& mesh, uint64_t code,
+                     std::span<const uint32_t> triangles, bool withSurface) {
+    constexpr size_t kFewPieces = kMostPieces / 8;
+    const glm::u32vec3 page = mortonDecode(code);
+    const uint32_t log2Cells = settings.grid.log2Cells;
+    const uint64_t records = buildExactTree(mesh, triangles, page, log2Cells).records();
+    const uint64_t exact = exactPageWorkBytes(triangles.size(), mostVertices(mesh, triangles), records);
+    if (!withSurface) return {exact};
+    const uint64_t halves = halvesTouched(mesh, triangles, page, log2Cells);
+    const Extents extents = extentsOf(mesh, triangles, settings.grid.edgeCells() + 2 * kExactMarginCells);
+    const uint64_t surface = surfaceWorkBytes(triangles.size(), extents.area, extents.perimeter, halves, kFewPieces);
+    return {std::max(exact, surface), kFewPieces};
+}
+
+/// Returns the work of all pages, none of which is to take more than `most` bytes if that can be.
+std::vector<PageWork> workOfPages(const LevelSettings& settings, const LatticeMesh& mesh, const TriangleBins& bins,
+                                  bool withSurface, uint64_t most) {
+    std::vector<PageWork> work(bins.pages.size());
+    tbb::parallel_for(size_t{0}, work.size(),
+                      [&](size_t i) { work[i] = foretoldWork(settings, mesh, bins.of(i), withSurface); });
+    // One after the other, and none of very many triangles: counting takes memory, too.
+    constexpr size_t kMostCounted = 1 << 18;
+    for (size_t i = 0; settings.exact && i < work.size(); ++i)
+        if (work[i].bytes > most && bins.of(i).size() <= kMostCounted)
+            work[i] = countedWork(settings, mesh, bins.pages[i], bins.of(i), withSurface);
+    return work;
 }
 
 }  // namespace
@@ -113,17 +162,20 @@ Result<BuiltPage> builtPage(const LevelSettings& settings, uint64_t code, const 
 
 Result<void> buildPages(const LevelSettings& settings, const LatticeMesh& mesh, const TriangleBins& bins,
                         PageSpool& spool, PageSpool* surfaces, const std::function<bool(double)>& progress) {
-    std::vector<uint64_t> work(bins.pages.size());
-    tbb::parallel_for(size_t{0}, work.size(),
-                      [&](size_t i) { work[i] = workOf(settings, mesh, bins.of(i), surfaces != nullptr); });
     const uint64_t held = bytesOf(mesh) + bins.triangles.size() * sizeof(uint32_t);
     const auto left = [&](uint64_t bytes) { return bytes - std::min(held, bytes); };
+    const std::vector<PageWork> work = workOfPages(settings, mesh, bins, surfaces != nullptr, left(settings.pageBytes));
+    std::vector<uint64_t> bytes(work.size());
+    std::ranges::transform(work, bytes.begin(), &PageWork::bytes);
     return buildInOrder(
-        {.work = work,
+        {.work = bytes,
          .pageBytes = left(settings.pageBytes),
          .roomBytes = left(settings.pageBytes + settings.roomBytes) - left(settings.pageBytes),
          .makeRoom = settings.makeRoom,
-         .build = [&](size_t i) { return buildPage(settings, mesh, bins.pages[i], bins.of(i), surfaces != nullptr); },
+         .build =
+             [&](size_t i) {
+                 return buildPage(settings, mesh, bins.pages[i], bins.of(i), surfaces != nullptr, work[i].pieces);
+             },
          .description = [&](size_t i) { return fmt::format("a subvolume holds {} triangles", bins.of(i).size()); },
          .pages = spool,
          .surfaces = surfaces,

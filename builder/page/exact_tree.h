@@ -33,7 +33,11 @@ inline constexpr double kExactMarginCells = 1.0 / kLatticePerCell;
 PageTree buildExactTree(const LatticeMesh& mesh, std::span<const uint32_t> triangles, glm::u32vec3 page,
                         uint32_t log2Cells, size_t mostRecords = kLeafIndexMask);
 
-/// Returns the bytes that a page of so many triangles needs while it is built and coded.
-constexpr uint64_t exactPageWorkBytes(uint64_t triangles) { return (6 << 20) + 500 * triangles; }
+/// Returns the bytes that a page needs while it is built and coded, measured: of triangles, their vertices (those with
+/// several normals or places in images count for each) and their records, which are kMostRepetition a triangle at most.
+/// A tree alone needs less.
+constexpr uint64_t exactPageWorkBytes(uint64_t triangles, uint64_t vertices, uint64_t records) {
+    return (6 << 20) + 60 * triangles + 150 * vertices + 30 * records;
+}
 
 }  // namespace vcp

@@ -1,6 +1,9 @@
 #include "builder/slab/page_surface.h"
 
+#include <bit>
 #include <cstring>
+
+#include <glm/common.hpp>
 
 #include "builder/slab/triangle_cutter.h"
 #include "octree/surface/leaf_math.h"
@@ -65,6 +68,28 @@ PageSurface surfaceOf(const LatticeMesh& mesh, std::span<const uint32_t> triangl
     SurfaceCutter(mesh, origin, depth, mostPieces).run(triangles, {glm::ivec3(0), depth}, surface.halves);
     surface.cells = foldCells(surface.halves);
     return surface;
+}
+
+uint64_t halvesTouched(const LatticeMesh& mesh, std::span<const uint32_t> triangles, glm::u32vec3 page,
+                       uint32_t log2Cells) {
+    constexpr int kHalf = kLatticePerCell / 2;
+    const glm::i32vec3 origin = glm::i32vec3(page) * (kLatticePerCell << log2Cells);
+    const int edge = 2 << log2Cells;
+    std::vector<uint64_t> rows(size_t(edge) * size_t(edge));
+    for (const uint32_t k : triangles) {
+        const auto& [a, b, c] = mesh.triangles[k];
+        const glm::i32vec3 p = mesh.positions[a], q = mesh.positions[b], r = mesh.positions[c];
+        // Closed boxes touch the half cells on both sides of a wall that they lie in.
+        const glm::i32vec3 low = glm::max((glm::min(p, glm::min(q, r)) - origin - 1) / kHalf, 0);
+        const glm::i32vec3 high = glm::min((glm::max(p, glm::max(q, r)) - origin) / kHalf, edge - 1);
+        if (high.x < low.x) continue;
+        const uint64_t row = ~uint64_t{0} >> (63 - (high.x - low.x)) << low.x;
+        for (int z = low.z; z <= high.z; ++z)
+            for (int y = low.y; y <= high.y; ++y) rows[size_t(z * edge + y)] |= row;
+    }
+    uint64_t halves = 0;
+    for (const uint64_t row : rows) halves += uint64_t(std::popcount(row));
+    return halves;
 }
 
 namespace {

@@ -51,11 +51,17 @@ StoredPage storedSurface(const PageSurface& surface);
 PageSurface surfaceFrom(const StoredPage& stored);
 
 /// Returns the bytes that surfaceOf needs for triangles with so large areas and perimeters together, in cells: a piece
-/// for each half cell that a triangle touches, and the cells themselves where the pieces come in parts.
-constexpr uint64_t surfaceWorkBytes(uint64_t triangles, double area, double perimeter) {
+/// for each half cell that a triangle touches, and the cells themselves where the pieces come in parts. `halves`: the
+/// most half cells with surface, all of a page of 32^3 cells unless they are counted.
+constexpr uint64_t surfaceWorkBytes(uint64_t triangles, double area, double perimeter, uint64_t halves = 1 << 18,
+                                    size_t mostPieces = kMostPieces) {
     const double pieces = 7 * area + 3 * perimeter + 2 * double(triangles);
-    if (pieces < double(kMostPieces)) return uint64_t(160 * pieces);
-    return 160 * kMostPieces + (64 << 20) + 160 * triangles;
+    if (pieces < double(mostPieces)) return uint64_t(160 * pieces);
+    return 160 * mostPieces + 256 * halves + 160 * triangles;
 }
+
+/// Returns how many half cells of a page the boxes around triangles touch. Precondition: log2Cells < 6.
+uint64_t halvesTouched(const LatticeMesh& mesh, std::span<const uint32_t> triangles, glm::u32vec3 page,
+                       uint32_t log2Cells);
 
 }  // namespace vcp

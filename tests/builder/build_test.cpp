@@ -299,6 +299,22 @@ TEST_F(Build, CrowdedPlacesHaveFinerPages) {
     EXPECT_TRUE(contentOf(o.output) == bytes);
 }
 
+TEST_F(Build, ADensePageFitsTheLeastMemory) {
+    // As many triangles as a page may hold, and long: what leaves may name, and pieces, would not fit.
+    IndexedMesh mesh = test::torusMesh({0, 0, 0}, 10, 4, 1000, 65);
+    test::append(mesh, test::boxMesh({40, 0, 0}, {41, 1, 1}, 1));
+    roundToFloat(mesh);
+    BuildOptions o = options({ply(mesh)});
+    o.cell = 1;
+    ASSERT_TRUE(buildOctree(o).ok());
+    EXPECT_EQ(dataset().pages.size(), 3u);
+    const std::string bytes = contentOf(o.output);
+    o.memoryBytes = 150 << 20;
+    const auto report = buildOctree(o);
+    ASSERT_TRUE(report.ok()) << report.error().line();
+    EXPECT_TRUE(contentOf(o.output) == bytes);
+}
+
 TEST_F(Build, OrderOfTheTrianglesDoesNotMatter) {
     IndexedMesh mesh = largeScene();
     std::vector<uint32_t> colours(mesh.positions.size());

@@ -257,7 +257,9 @@ TEST(Slabs, APageCutPartByPartIsTheSame) {
         SCOPED_TRACE(scene.name);
         for (uint32_t octant = 0; octant < 8; ++octant) {
             const glm::u32vec3 page(octant & 1, octant >> 1 & 1, octant >> 2);
-            const StoredPage whole = storedSurface(surfaceOf(scene.mesh, allOf(scene.mesh), page, kSlabLog2Cells));
+            const PageSurface surface = surfaceOf(scene.mesh, allOf(scene.mesh), page, kSlabLog2Cells);
+            EXPECT_GE(halvesTouched(scene.mesh, allOf(scene.mesh), page, kSlabLog2Cells), surface.halves.size());
+            const StoredPage whole = storedSurface(surface);
             for (const size_t pieces : {size_t{0}, size_t{20}}) {
                 const StoredPage parts =
                     storedSurface(surfaceOf(scene.mesh, allOf(scene.mesh), page, kSlabLog2Cells, pieces));
