@@ -11,36 +11,40 @@ namespace vcp {
 namespace {
 
 Result<PageSurface> surfaceAbove(const PageSpool& below, Siblings siblings, uint32_t log2Cells) {
-    std::vector<PageSurface> pages;
-    std::vector<uint32_t> octants;
-    for (size_t i = siblings.first; i < siblings.end; ++i) {
-        const PageEntry& entry = below.entries()[i];
-        VCP_TRY_ASSIGN(const auto stored, below.read(entry));
-        pages.push_back(surfaceFrom(stored));
-        octants.push_back(uint32_t(entry.morton & 7));
+    const auto entries = std::span(below.entries()).subspan(siblings.first, siblings.end - siblings.first);
+    size_t cells = 0, halves = 0;
+    for (const PageEntry& entry : entries) {
+        cells += cellsIn(entry.storedBytes);
+        halves += cellsIn(entry.colourStoredBytes);
     }
-    return foldPages(pages, octants, log2Cells);
+    PageFold fold(log2Cells, cells, halves);
+    for (const PageEntry& entry : entries) {
+        VCP_TRY_ASSIGN(const auto stored, below.read(entry));
+        fold.add(surfaceFrom(stored), uint32_t(entry.morton & 7));
+    }
+    return fold.take();
 }
 
 Result<BuiltPage> buildPage(const LevelSettings& settings, const PageSpool& below, Siblings siblings,
                             bool withSurface) {
-    VCP_TRY_ASSIGN(const auto surface, surfaceAbove(below, siblings, settings.grid.log2Cells));
+    VCP_TRY_ASSIGN(auto surface, surfaceAbove(below, siblings, settings.grid.log2Cells));
     PageTree tree = buildSlabTree(surface, settings.grid.log2Cells);
+    surface.quarters = {};
     const uint64_t code = below.entries()[siblings.first].morton >> 3;
     VCP_TRY_ASSIGN(auto page, builtPage(settings, code, encodeSlabPage(tree, settings.withColour)));
     if (withSurface) page.surface = storedSurface(surface);
     return page;
 }
 
-/// Returns the memory to build a page above these: their cells, read and put together, and its bytes before and after
-/// they are coded.
+/// Returns the memory to build a page above these: their cells, put together as they are read, and its octree; then its
+/// bytes. Measured: at most 1.6 times the stored ones, of pages with few cells 2.5 times.
 uint64_t workOf(const PageSpool& below, Siblings siblings) {
     uint64_t bytes = 0;
     for (size_t i = siblings.first; i < siblings.end; ++i) {
         const PageEntry& entry = below.entries()[i];
         bytes += entry.storedBytes + entry.colourStoredBytes;
     }
-    return (4 << 20) + 5 * bytes;
+    return (4 << 20) + 2 * bytes;
 }
 
 }  // namespace

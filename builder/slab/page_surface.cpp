@@ -96,22 +96,33 @@ namespace {
 
 /// Appends the cells of a page to those of the page above.
 void append(SurfaceCells& to, const SurfaceCells& from, uint32_t octant, uint32_t depth) {
-    to.codes.reserve(to.size() + from.size());
     for (const uint32_t code : from.codes) to.codes.push_back(octant << 3 * depth | code);
     to.cells.insert(to.cells.end(), from.cells.begin(), from.cells.end());
 }
 
+void reserve(SurfaceCells& cells, size_t count) {
+    cells.codes.reserve(count);
+    cells.cells.reserve(count);
+}
+
 }  // namespace
 
-PageSurface foldPages(std::span<const PageSurface> pages, std::span<const uint32_t> octants, uint32_t log2Cells) {
-    PageSurface surface;
-    for (size_t i = 0; i < pages.size(); ++i) {
-        append(surface.halves, pages[i].cells, octants[i], log2Cells);
-        append(surface.quarters, pages[i].halves, octants[i], log2Cells + 1);
-    }
-    surface.cells = foldCells(surface.halves);
-    return surface;
+PageFold::PageFold(uint32_t log2Cells, size_t halves, size_t quarters) : log2Cells_(log2Cells) {
+    reserve(above_.halves, halves);
+    reserve(above_.quarters, quarters);
 }
+
+void PageFold::add(const PageSurface& page, uint32_t octant) {
+    append(above_.halves, page.cells, octant, log2Cells_);
+    append(above_.quarters, page.halves, octant, log2Cells_ + 1);
+}
+
+PageSurface PageFold::take() {
+    above_.cells = foldCells(above_.halves);
+    return std::move(above_);
+}
+
+size_t cellsIn(uint64_t storedBytes) { return storedBytes / (sizeof(uint32_t) + sizeof(CellSurface)); }
 
 std::vector<std::byte> bytesOf(const SurfaceCells& cells) {
     const size_t codes = cells.size() * sizeof(uint32_t), all = cells.size() * sizeof(CellSurface);
@@ -123,7 +134,7 @@ std::vector<std::byte> bytesOf(const SurfaceCells& cells) {
 }
 
 SurfaceCells surfaceCellsFrom(std::span<const std::byte> bytes) {
-    const size_t count = bytes.size() / (sizeof(uint32_t) + sizeof(CellSurface));
+    const size_t count = cellsIn(bytes.size());
     SurfaceCells cells{std::vector<uint32_t>(count), std::vector<CellSurface>(count)};
     if (count == 0) return cells;
     std::memcpy(cells.codes.data(), bytes.data(), count * sizeof(uint32_t));

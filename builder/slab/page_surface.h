@@ -35,8 +35,24 @@ inline constexpr size_t kMostPieces = 1 << 19;
 PageSurface surfaceOf(const LatticeMesh& mesh, std::span<const uint32_t> triangles, glm::u32vec3 page,
                       uint32_t log2Cells, size_t mostPieces = kMostPieces);
 
-/// Puts together the page above up to eight pages. `octants`: where each of them is, ascending.
-PageSurface foldPages(std::span<const PageSurface> pages, std::span<const uint32_t> octants, uint32_t log2Cells);
+/// Puts together the page above up to eight pages, one after the other, so that they need not be in memory together.
+class PageFold {
+public:
+    /// The page above will have so many halves and quarters of cells, at most.
+    PageFold(uint32_t log2Cells, size_t halves, size_t quarters);
+
+    /// Adds a page. `octant`: where it is; octants ascend.
+    void add(const PageSurface& page, uint32_t octant);
+    /// Returns the page above. Nothing may follow.
+    PageSurface take();
+
+private:
+    uint32_t log2Cells_;
+    PageSurface above_;
+};
+
+/// Returns how many cells so many stored bytes are.
+size_t cellsIn(uint64_t storedBytes);
 
 /// Returns the coarser cells that hold these.
 SurfaceCells foldCells(const SurfaceCells& eighths);

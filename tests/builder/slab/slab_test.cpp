@@ -111,7 +111,9 @@ FoldedPages pagesOf(const LatticeMesh& mesh) {
         pages.finest.push_back(std::move(surface));
         pages.octants.push_back(o);
     }
-    pages.above = foldPages(pages.finest, pages.octants, kSlabLog2Cells);
+    PageFold fold(kSlabLog2Cells, 0, 0);
+    for (size_t i = 0; i < pages.finest.size(); ++i) fold.add(pages.finest[i], pages.octants[i]);
+    pages.above = fold.take();
     return pages;
 }
 
