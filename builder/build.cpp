@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <memory>
 #include <optional>
 #include <utility>
@@ -406,6 +407,16 @@ private:
                                                                          memory_.bufferBytes / 4);
     }
 
+    /// Of scans of one density hardly a triangle is so small.
+    void warnOfTiny(uint64_t tiny) {
+        if (tiny < 100 || tiny < measures_.triangles / 100) return;
+        report_.warnings.push_back(
+            fmt::format("{} of {} triangles are smaller than this file can tell, {:.4g}: they lose their shape; build "
+                        "meshes of very different sizes into files of their own, which a scene shows together, or "
+                        "choose a smaller --cell",
+                        tiny, measures_.triangles, 2 * plan_.frame.cell / kLatticePerCell));
+    }
+
     Result<void> dealSoup() {
         std::optional<MaterialColours> colours;
         if (colourUse().materials) colours.emplace(files_.soup->materials, memory_.vertexBytes);
@@ -413,15 +424,18 @@ private:
         const LatticeSnapper snapper(plan_.frame, colours ? &*colours : nullptr, colourUse().vertices, plan_.pages,
                                      placed);
         const double begins = kReadingShare + kDealingShare / 2;
+        std::atomic<uint64_t> tiny = 0;
         const Dealing dealing{*files_.soup,
                               snapper,
                               plan_.gridOf(pass_ - 1),
                               files_.textures.get(),
                               plan_.pages,
                               plan_.marginCells(),
+                              tiny,
                               [&](double part) { return progress("sorting", begins + kDealingShare / 2 * part); }};
         openPass();
         VCP_TRY(arena_.execute([&] { return dealTriangles(dealing, plan_.finest, *files_.current); }));
+        warnOfTiny(tiny);
         if (colours)
             report_.warnings.insert(report_.warnings.end(), colours->warnings().begin(), colours->warnings().end());
         return {};

@@ -213,13 +213,31 @@ private:
     std::optional<BinBatch<TexturedTriangle>> batch_;
 };
 
+/// Counts triangles that have hardly any shape left on the lattice.
+class TinyCount {
+public:
+    explicit TinyCount(std::atomic<uint64_t>& all) : all_(all) {}
+    void add(const LatticeTriangle& t) {
+        const auto& [a, b, c] = t.corner;
+        const glm::i32vec3 size = glm::max(a, glm::max(b, c)) - glm::min(a, glm::min(b, c));
+        here_ += std::max(size.x, std::max(size.y, size.z)) < 2 ? 1 : 0;
+    }
+    void finish() { all_ += std::exchange(here_, 0); }
+
+private:
+    std::atomic<uint64_t>& all_;
+    uint64_t here_ = 0;
+};
+
 struct DealVisit {
     const PageGrid& grid;
     const PagePartition& partition;
     BinBatch<LatticeTriangle> batch;
     TextureBatch textures;
+    TinyCount tiny;
 
     Result<void> operator()(const LatticeTriangle& t, const std::optional<TexturedTriangle>& place) {
+        tiny.add(t);
         VCP_TRY(textures.add(place));
         size_t bin[3];
         for (int i = 0; i < 3; ++i) bin[i] = partition.binOf(grid.pageOf(t.corner[i]));
@@ -228,6 +246,7 @@ struct DealVisit {
         return {};
     }
     Result<void> finish() {
+        tiny.finish();
         VCP_TRY(textures.flush());
         return batch.flush();
     }
@@ -237,15 +256,18 @@ struct DealVisit {
 struct OneBinVisit {
     RecordBins<LatticeTriangle>& bins;
     TextureBatch textures;
+    TinyCount tiny;
     std::vector<LatticeTriangle> held = {};
 
     Result<void> operator()(const LatticeTriangle& t, const std::optional<TexturedTriangle>& place) {
         constexpr size_t kMostHeld = 4096;
+        tiny.add(t);
         VCP_TRY(textures.add(place));
         held.push_back(t);
         return held.size() < kMostHeld ? Result<void>() : append();
     }
     Result<void> finish() {
+        tiny.finish();
         VCP_TRY(textures.flush());
         return append();
     }
@@ -305,10 +327,11 @@ Result<void> dealTriangles(const Dealing& dealing, const PagePartition& partitio
         return forLatticeTriangles(dealing.soup, dealing.snapper, true, dealing.progress, makeVisit);
     };
     if (partition.bins() == 1)
-        VCP_TRY(deal([&] { return OneBinVisit{bins, TextureBatch(dealing, partition)}; }));
+        VCP_TRY(deal([&] { return OneBinVisit{bins, TextureBatch(dealing, partition), TinyCount(dealing.tiny)}; }));
     else
         VCP_TRY(deal([&] {
-            return DealVisit{dealing.grid, partition, BinBatch(bins), TextureBatch(dealing, partition)};
+            return DealVisit{dealing.grid, partition, BinBatch(bins), TextureBatch(dealing, partition),
+                             TinyCount(dealing.tiny)};
         }));
     if (dealing.textures != nullptr) VCP_TRY(dealing.textures->raw().flush());
     return bins.raw().flush();

@@ -1,6 +1,7 @@
 // Dealing: the soup's triangles, on the deepest level's lattice, into bins that fit memory; and which pages hold them.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <functional>
 #include <utility>
@@ -58,6 +59,7 @@ struct Dealing {
     RecordBins<TexturedTriangle>* textures;
     const FinestPages& pages;
     double marginCells;  ///< how far around a page it needs them
+    std::atomic<uint64_t>& tiny;  ///< counts the triangles that are less than two steps of the lattice along each axis
     /// Called with the part of the soup that is read; false cancels. Any of the threads calls it.
     std::function<bool(double)> progress;
 };

@@ -127,13 +127,15 @@ struct FrameRequest {
     uint32_t sample = 0;                  ///< where in its pixel each ray goes (pixel_samples.h): 0: the middle
     double errorPixels = 0.5;             ///< a page is refined where its certified error projects to more
     Shading shading;
-    std::vector<SectionPlane> sections;  ///< at most kMostSections
-    Caps sectionCaps = Caps::None;       ///< without sections there are none
-    bool beam = true;                    ///< beam pass; the picture is the same without it, only slower
-    bool countSteps = false;             ///< fills FrameStats::steps and fetches (a slower variant)
-    PaperMarch march;                    ///< march through datasets of the method `paper`
-    std::vector<DatasetLook> looks;      ///< of datasets that are shown otherwise than as they are
-    std::vector<uint32_t> hidden;        ///< numbers of datasets that are neither drawn nor loaded, in any order
+    std::vector<SectionPlane> sections;     ///< at most kMostSections
+    Caps sectionCaps = Caps::None;          ///< without sections there are none
+    bool beam = true;                       ///< beam pass; the picture is the same without it, only slower
+    bool countSteps = false;                ///< fills FrameStats::steps and fetches (a slower variant)
+    PaperMarch march;                       ///< march through datasets of the method `paper`
+    std::vector<DatasetLook> looks;         ///< of datasets that are shown otherwise than as they are
+    std::vector<uint32_t> hidden;           ///< numbers of datasets that are neither drawn nor loaded, in any order
+    std::vector<glm::dvec3> surfacesMoved;  ///< by which surfaces with mesostructure are not where they lie, world
+                                            ///< units, one each; there may be fewer
 
     bool operator==(const FrameRequest&) const = default;
 };
@@ -154,6 +156,11 @@ inline FrameRequest requestOfLook(const FrameRequest& request, size_t dataset) {
 /// Whether the request leaves a dataset out.
 inline bool isHidden(const FrameRequest& request, size_t dataset) {
     return std::find(request.hidden.begin(), request.hidden.end(), dataset) != request.hidden.end();
+}
+
+/// Returns by how much the picture shows a surface moved.
+inline glm::dvec3 movedBy(const FrameRequest& request, size_t surface) {
+    return surface < request.surfacesMoved.size() ? request.surfacesMoved[surface] : glm::dvec3(0);
 }
 
 }  // namespace vcp

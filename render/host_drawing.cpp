@@ -165,7 +165,7 @@ Result<HostPicture> drawOnHost(std::span<const HostDataset> datasets, std::span<
         const meso::Shell& shell = each.surface->shell;
         drawn.push_back(
             {*each.surface->arrays, shell, each.look.view, *each.words, each.look.textures, each.look.isFarDrawn});
-        setPicture(drawn.back().view, shell.origin, request);
+        setPicture(drawn.back().view, shell.origin + movedBy(request, drawn.size() - 1), request);
     }
     VCP_TRY(drawLayers(layers, drawn, datasets, request, options, picture));
     if (request.sample == 0) tell(placed, layers, picture);

@@ -40,15 +40,17 @@ std::optional<double> errorAt(const MesoSurface& surface, const MesoHit& hit) {
 }  // namespace
 
 std::optional<SurfacePoint> pickOnSurfaces(std::span<const MesoSurface> surfaces, glm::dvec3 origin,
-                                           glm::dvec3 direction, std::span<const SectionPlane> sections) {
+                                           glm::dvec3 direction, std::span<const SectionPlane> sections,
+                                           std::span<const glm::dvec3> moved) {
     std::optional<SurfacePoint> nearest;
     const PictureRays rays{.origin = origin, .direction = direction, .size = {1, 1}, .sections = sectionCuts(sections)};
     MesoHit hit;
     hit.depth = std::numeric_limits<float>::infinity();
-    for (const MesoSurface& surface : surfaces) {
+    for (size_t i = 0; i < surfaces.size(); ++i) {
+        const MesoSurface& surface = surfaces[i];
         if (!surface.arrays) continue;
         HostSurface cast{*surface.arrays, surface.shell, plainView(surface), {}, 0, false};
-        setRays(cast.view, surface.shell.origin, rays);
+        setRays(cast.view, surface.shell.origin + (i < moved.size() ? moved[i] : glm::dvec3(0)), rays);
         uint32_t iterations = 0;
         SurfaceWork work;
         if (SurfaceCaster(cast).castPixel({0, 0}, hit, iterations, work))

@@ -20,8 +20,9 @@ struct SurfacePoint {
 };
 
 /// Returns the first point that a ray meets on what section planes keep of the surfaces; nothing where it meets none.
-/// Remeshed surfaces are left out. `direction`: unit.
+/// Remeshed surfaces are left out. `direction`: unit. `moved`: as FrameRequest::surfacesMoved.
 std::optional<SurfacePoint> pickOnSurfaces(std::span<const MesoSurface> surfaces, glm::dvec3 origin,
-                                           glm::dvec3 direction, std::span<const SectionPlane> sections = {});
+                                           glm::dvec3 direction, std::span<const SectionPlane> sections = {},
+                                           std::span<const glm::dvec3> moved = {});
 
 }  // namespace vcp

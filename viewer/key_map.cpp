@@ -21,6 +21,7 @@ constexpr KeyHelp kKeyMap[] = {
     {KeyGroup::View, "P", "perspective or orthographic"},
     {KeyGroup::View, "U", "the up axis: y or z"},
     {KeyGroup::View, "G", "fly: W A S D, E up, Q down, drag to look, wheel for speed; G or Esc ends it"},
+    {KeyGroup::View, "Space", "what moves in a scene goes on, or stays"},
     {KeyGroup::View, "Ctrl+1 ... Ctrl+9", "keep this view as a bookmark"},
     {KeyGroup::View, "Shift+1 ... Shift+9", "go to a bookmark"},
     {KeyGroup::View, "Ctrl+C, Ctrl+V", "copy the camera as JSON, go to the copied one"},
@@ -43,7 +44,7 @@ constexpr KeyHelp kKeyMap[] = {
     {KeyGroup::Window, "Ctrl+O", "open a file"},
     {KeyGroup::Window, "Tab", "the panel"},
     {KeyGroup::Window, "F1", "this list"},
-    {KeyGroup::Window, "Esc", "ends what is going on, else the program"},
+    {KeyGroup::Window, "Esc", "ends what is going on, else the program (twice, where a measurement is not written)"},
     {KeyGroup::Window, "Ctrl+Q", "quit"},
 };
 
@@ -100,6 +101,8 @@ std::optional<ViewerAction> actionOf(uint32_t key) {
             return ViewerAction::ToggleUpAxis;
         case 'G':
             return ViewerAction::ToggleFly;
+        case ' ':
+            return ViewerAction::TogglePlay;
         case '1':
             return ViewerAction::ViewFront;
         case '3':

@@ -151,6 +151,7 @@ void Viewer::show(const std::vector<PlacedDataset>& datasets, const MesoScene& s
     move_.reset();
     sectionDrag_.reset();
     sectionAnchors_.clear();
+    motion_ = SurfaceMotion(surfaces.paths);
     hidden_.clear();
     looks_.clear();
     flySpeed_ = 1;
@@ -366,7 +367,7 @@ void Viewer::advanceCamera(double now) {
         const double part = (now - move_->beganAt) / options_.moveSeconds;
         camera_ = between(move_->from, move_->to, eased(std::clamp(part, 0.0, 1.0)));
         if (part >= 1) move_.reset();
-    } else if (isSentSomewhere()) {
+    } else if (isFlown()) {
         const double step = std::min(now - now_, kLongestFlyStep) * flySpeed_ * bounds_.diagonal() / kFlySeconds;
         camera_.position +=
             camera_.orientation * (glm::dvec3(flyDirection_.x, flyDirection_.y, -flyDirection_.z) * step);
@@ -403,6 +404,7 @@ void Viewer::moveSections(double steps) {
 
 std::string Viewer::whyWithout(ViewerAction action) const {
     if (action == ViewerAction::ToggleShadows && !areLightsOn(shading_)) return "surroundings alone cast no shadows";
+    if (action == ViewerAction::TogglePlay && isOpen_ && !motion_.isThere()) return "nothing moves in this scene";
     if (!isPaper_) return {};
     if (action == ViewerAction::ToggleShadows) return "files of the method paper are drawn without shadows";
     if (action == ViewerAction::ToggleOcclusion) return "files of the method paper are drawn without ambient occlusion";
@@ -453,6 +455,9 @@ void Viewer::act(ViewerAction action) {
         case ViewerAction::ToggleFly:
             isFlying_ = !isFlying_;
             break;
+        case ViewerAction::TogglePlay:
+            motion_.play(!motion_.isPlaying());
+            break;
         case ViewerAction::ViewFront:
             look(View::Front);
             break;
@@ -479,6 +484,13 @@ int Viewer::reductionAt(double now) const {
     return std::max(wanted, movingReduction_);
 }
 
+void Viewer::advanceMotion(double now) {
+    // What is drawn step by step is finished first.
+    if (!motion_.isPlaying() || !drawn_ || renderer_->isUnfinished()) return;
+    motion_.advance(now - now_);
+    movedAt_ = now;
+}
+
 FrameRequest Viewer::requestWith(int reduction) const {
     FrameRequest request;
     request.camera = camera_.current();
@@ -495,6 +507,7 @@ FrameRequest Viewer::requestWith(int reduction) const {
     request.march = options_.march;
     request.hidden = hidden_;
     request.looks = looks_;
+    request.surfacesMoved = motion_.surfacesMoved();
     return request;
 }
 
@@ -523,7 +536,10 @@ bool Viewer::refinementIsDue(double now) const {
 }
 
 Result<NextStep> Viewer::update(double now) {
-    if (isOpen_) advanceCamera(now);
+    if (isOpen_) {
+        advanceCamera(now);
+        advanceMotion(now);
+    }
     now_ = now;
     if (!hasSize()) return NextStep{};
     if (drawn_ && (!sameView(camera_, seen_) || (sectionDrag_ && sections_ != request_.sections))) movedAt_ = now;
@@ -550,7 +566,7 @@ bool Viewer::isCheaper() const {
     return requestReduction_ > 1 || request_.shading.occlusionRays != shading_.occlusionRays;
 }
 
-bool Viewer::isAtRest() const { return status_.update.settled && !isCheaper() && !isSentSomewhere(); }
+bool Viewer::isAtRest() const { return status_.update.settled && !isCheaper() && !isUnderWay(); }
 
 uint32_t Viewer::mostSamples() const { return std::min(mostSamples_, samplesOf(request_, options_.samples)); }
 
@@ -571,7 +587,7 @@ NextStep Viewer::nextStep(double now) {
     if (!status_.update.settled) next.waitSeconds = kLoadingPollSeconds;
     if (isCheaper() || samplesFollow)
         next.waitSeconds = std::min(next.waitSeconds, std::max(0.0, movedAt_ + kRestSeconds - now));
-    if (isSentSomewhere()) next.waitSeconds = 0;
+    if (isUnderWay()) next.waitSeconds = 0;
     // What a frame in flight tells is taken in by the next update.
     if (renderer_->isDrawing()) next.waitSeconds = std::min(next.waitSeconds, kLoadingPollSeconds);
     return next;

@@ -35,6 +35,7 @@
 #include "viewer/camera/orbit_camera.h"
 #include "viewer/scene/meso_scene.h"
 #include "viewer/section_handle.h"
+#include "viewer/surface_motion.h"
 
 namespace vcp {
 
@@ -56,6 +57,7 @@ enum class ViewerAction {
     ToggleColour,      ///< the dataset's colours, or clay
     ToggleUpAxis,      ///< y or z
     ToggleFly,
+    TogglePlay,  ///< surfaces that go along paths go on, or stay where they are
     ViewFront,
     ViewRight,
     ViewTop,
@@ -217,6 +219,8 @@ public:
     /// The look of one of them, and another one for it.
     [[nodiscard]] DatasetLook lookOf(uint32_t dataset) const;
     void setLook(const DatasetLook& look);
+    /// Surfaces that go along paths; while they do, frames are drawn as while the camera moves.
+    [[nodiscard]] const SurfaceMotion& motion() const { return motion_; }
     /// Lets section planes be gripped from now on; for a host that draws the handles. `scale`: as for sectionHandle();
     /// 0: not any more.
     void showSectionHandles(double scale) { handleScale_ = scale; }
@@ -271,7 +275,10 @@ private:
     void dragSection(glm::dvec2 pixel);
     void look(View view);
     void advanceCamera(double now);
-    [[nodiscard]] bool isSentSomewhere() const { return move_ || (isFlying_ && flyDirection_ != glm::dvec3(0)); }
+    void advanceMotion(double now);
+    [[nodiscard]] bool isFlown() const { return isFlying_ && flyDirection_ != glm::dvec3(0); }
+    /// Whether something goes on by itself.
+    [[nodiscard]] bool isUnderWay() const { return move_ || isFlown() || motion_.isPlaying(); }
 
     ViewerOptions options_;
     std::unique_ptr<Renderer> renderer_;
@@ -288,6 +295,7 @@ private:
     double handleScale_ = 0;
     std::optional<SectionDrag> sectionDrag_;
     Caps sectionCaps_ = Caps::None;
+    SurfaceMotion motion_;
     std::vector<uint32_t> hidden_;
     std::vector<DatasetLook> looks_;
     glm::ivec2 size_{0};

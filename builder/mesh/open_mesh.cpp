@@ -66,6 +66,8 @@ Result<std::unique_ptr<MeshStream>> openMesh(const std::filesystem::path& path, 
     VCP_TRY_ASSIGN(auto source, ByteSource::open(path));
     VCP_TRY_ASSIGN(const auto window, source.window(kFormatStartBytes));
     if (source.atEnd()) return source.error(ErrorCode::InvalidInput, "", 0, "the file is empty");
+    if (window.starts_with("VCP\r\n"))
+        return source.error(ErrorCode::Unsupported, "", std::nullopt, "is a .vcp file already, and no mesh");
     std::string format = formatByContent(window.substr(0, kFormatStartBytes), source);
     if (format.empty()) format = wanted;
     if (format.empty()) format = formatByName(path);

@@ -67,6 +67,7 @@ Result<std::vector<std::array<size_t, 3>>> writeMap(const BaseSurface& surface, 
 Result<void> writeBase(const std::filesystem::path& output, const BaseSurface& surface, const OutputRules& rules) {
     VCP_TRY_ASSIGN(auto file, OutputFile::create(output, OutputKind::Obj, rules));
     TextOut out(file);
+    VCP_TRY(out.add("# a base surface by vcp\n"));
     for (const dvec3 p : surface.positions) VCP_TRY(out.add("v {} {} {}\n", p.x, p.y, p.z));
     for (const dvec3 n : normalsOf(surface)) VCP_TRY(out.add("vn {:.6g} {:.6g} {:.6g}\n", n.x, n.y, n.z));
     VCP_TRY_ASSIGN(const auto corners, writeMap(surface, out));

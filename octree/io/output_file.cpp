@@ -54,6 +54,15 @@ bool looksLikeBinaryStl(std::span<const std::byte> start) {
     return true;
 }
 
+/// Whether a file that begins so may be somebody's own, of which there is no other: a mesh without what ours say at
+/// their beginning (mesh_format.cpp, base_file.cpp).
+bool isOriginal(OutputKind kind, std::span<const std::byte> start) {
+    constexpr OutputKind kMeshes[] = {OutputKind::Ply, OutputKind::Obj, OutputKind::Stl, OutputKind::Glb};
+    const std::string_view text(reinterpret_cast<const char*>(start.data()), start.size());
+    const auto says = [&](std::string_view word) { return text.find(word) != std::string_view::npos; };
+    return std::ranges::find(kMeshes, kind) != std::end(kMeshes) && !says("certified_distance") && !says("vcp");
+}
+
 /// Datasets and assets are marked: their header is written last, so that a mark can stand in its place until then.
 bool isMarked(OutputKind kind) { return kind == OutputKind::Dataset || kind == OutputKind::Asset; }
 
@@ -103,9 +112,15 @@ Result<void> checkReplaced(const fs::path& output, const fs::path& target, Outpu
         return ioError(output, "is write-protected; give another name, or ask for overwriting");
     const FileDescriptor file(::open(target.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
     if (!file.isOpen()) return systemError(output, "is there, and cannot be looked into", errno);
-    if (beginsLike(kind, startOf(file.number()))) return {};
-    return ioError(output,
-                   fmt::format("is there and is not {}; give another name, or ask for overwriting", wordsFor(kind)));
+    const auto start = startOf(file.number());
+    if (!beginsLike(kind, start))
+        return ioError(
+            output, fmt::format("is there and is not {}; give another name, or ask for overwriting", wordsFor(kind)));
+    if (isOriginal(kind, start))
+        return ioError(output, fmt::format("is there and is {} that vcp did not write; give another name, or ask for "
+                                           "overwriting",
+                                           wordsFor(kind)));
+    return {};
 }
 
 /// Removes what an interrupted writer left under that name. Errors: Io (another writer holds it).

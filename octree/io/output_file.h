@@ -30,7 +30,8 @@ namespace vcp {
 enum class OutputKind { Dataset, Asset, Png, Pfm, JsonText, Svg, Text, Ply, Obj, Stl, Glb, Dxf, Mp4, Webm };
 
 struct OutputRules {
-    bool overwrite = false;  ///< also files of another kind, and write-protected ones, may be replaced
+    /// Also files of another kind, meshes that vcp did not write, and write-protected files may be replaced.
+    bool overwrite = false;
     /// Files that the caller reads: they are never replaced. Files that do not exist are ignored.
     std::vector<std::filesystem::path> inputs = {};
 };

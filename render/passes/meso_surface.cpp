@@ -152,11 +152,12 @@ Result<void> MesoSurfacePass::prepare(MesoTarget& target, const Picture& picture
     return {};
 }
 
-MesoConstants MesoSurfacePass::constantsOf(const Placed& surface, const FrameRequest& request) const {
+MesoConstants MesoSurfacePass::constantsOf(size_t number, const FrameRequest& request) const {
+    const Placed& surface = surfaces_[number];
     MesoConstants c{surface.arrays ? surface.arrays->record : meso::f32::MesoRecord{}, surface.view};
     // Textures are repeated with the tile.
     if (surface.remeshed.surface) c.record.extent = glm::vec3(1, surface.remeshed.surface->heights->rows(), 1);
-    setPicture(c.view, surface.origin, request);
+    setPicture(c.view, surface.origin + movedBy(request, number), request);
     return c;
 }
 
@@ -187,7 +188,7 @@ void MesoSurfacePass::recordHits(VkCommandBuffer commands, const MesoTarget& tar
     vkCmdFillBuffer(commands, target.hits.handle(), plane, (frame::kMesoPlanes - 1) * plane, 0);
     vkCmdFillBuffer(commands, target.counters.handle(), 0, VK_WHOLE_SIZE, 0);
     for (size_t i = 0; i < surfaces_.size(); ++i) {
-        const MesoConstants constants = constantsOf(surfaces_[i], request);
+        const MesoConstants constants = constantsOf(i, request);
         vkCmdUpdateBuffer(commands, target.drawings[i].constants.handle(), 0, sizeof constants, &constants);
     }
     barrierToAll(commands);

@@ -105,7 +105,7 @@ private:
     Result<void> makeTarget(MesoTarget& target, PictureSize size, const Picture& picture);
     Result<void> choosePipelines(const Placed& surface, MesoTarget::Drawing& drawing, const Shading& shading,
                                  bool inScene);
-    MesoConstants constantsOf(const Placed& surface, const FrameRequest& request) const;
+    MesoConstants constantsOf(size_t number, const FrameRequest& request) const;
     /// Records the ray that the next dispatches cast.
     void push(VkCommandBuffer commands, const frame::MesoLightRay& ray) const;
     void dispatch(VkCommandBuffer commands, VkPipeline pipeline, const MesoTarget& target, size_t surface) const;

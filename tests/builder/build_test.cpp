@@ -315,6 +315,20 @@ TEST_F(Build, ADensePageFitsTheLeastMemory) {
     EXPECT_TRUE(contentOf(o.output) == bytes);
 }
 
+TEST_F(Build, WhatIsTooSmallForTheFileIsWarnedOf) {
+    IndexedMesh mesh = test::sphereMesh({0, 0, 0}, 1000, 60);
+    const size_t large = mesh.triangles.size();
+    const auto ownReport = buildOctree(options({ply(mesh)}));
+    ASSERT_TRUE(ownReport.ok());
+    EXPECT_TRUE(ownReport->warnings.empty());
+    test::append(mesh, test::sphereMesh({1500, 0, 0}, 1e-3, 30));
+    const auto report = buildOctree(options({ply(mesh)}));
+    ASSERT_TRUE(report.ok()) << report.error().line();
+    ASSERT_EQ(report->warnings.size(), 1u);
+    const std::string words = fmt::format("{} of {} triangles", mesh.triangles.size() - large, mesh.triangles.size());
+    EXPECT_NE(report->warnings[0].find(words), std::string::npos) << report->warnings[0];
+}
+
 TEST_F(Build, OrderOfTheTrianglesDoesNotMatter) {
     IndexedMesh mesh = largeScene();
     std::vector<uint32_t> colours(mesh.positions.size());

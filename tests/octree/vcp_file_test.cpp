@@ -342,7 +342,7 @@ TEST_F(VcpFile, WrongMagicAndVersion) {
     magic[0] = std::byte{'X'};
     const auto notVcp = readDataset(MemoryFile(magic));
     ASSERT_FALSE(notVcp.ok());
-    EXPECT_EQ(notVcp.error().line(), "memory.vcp: header: byte 0: not a .vcp file");
+    EXPECT_EQ(notVcp.error().line(), "memory.vcp: header: byte 0: not a .vcp file; of meshes, vcp build makes one");
 
     Bytes version = bytes_;
     version[8] = std::byte{17};

@@ -55,6 +55,10 @@ TEST(SurfacePick, TheNearestOfSurfacesAndWhatPlanesKeep) {
     ASSERT_TRUE(lower);
     EXPECT_NEAR(lower->position.z, 0.3, 1e-5);
     EXPECT_NEAR(lower->depth, 5.7, 1e-5);
+    const std::vector<glm::dvec3> moved = {{0.5, 0, 0}, {0, 0, -1}};
+    EXPECT_NEAR(pickOnSurfaces(surfaces, from, down, {}, moved)->position.z, 1.3, 1e-5);
+    const std::vector<glm::dvec3> aside = {{0, 0, 0.5}, {0, 5, 0}};
+    EXPECT_NEAR(pickOnSurfaces(surfaces, from, down, {}, aside)->position.z, 0.8, 1e-5);
     EXPECT_FALSE(pickOnSurfaces(surfaces, from, -down));
     EXPECT_FALSE(pickOnSurfaces({}, from, down));
 }

@@ -769,6 +769,37 @@ TEST_F(ViewerTest, SurfacesAreShownWithAndWithoutDatasets) {
     EXPECT_FALSE(viewer_->open(std::vector<PlacedDataset>{}, MesoScene{}, viewer_->camera(), "nothing"));
 }
 
+TEST_F(ViewerTest, WhatMovesGoesOnUntilItIsToStay) {
+    openViewer();
+    EXPECT_EQ(viewer_->whyWithout(ViewerAction::TogglePlay), "nothing moves in this scene");
+    MesoSurfaceDescription ball;
+    ball.asset = "ball", ball.path.points = {{0, 0, 0}, {4, 0, 0}};
+    const auto surfaces = makeMesoScene({&ball, 1});
+    ASSERT_TRUE(surfaces) << surfaces.error().line();
+    OrbitCamera camera;
+    camera.look(View::Isometric, surfaces->bounds, kSize);
+    ASSERT_TRUE(viewer_->open({}, *surfaces, camera, "ball"));
+    EXPECT_EQ(viewer_->whyWithout(ViewerAction::TogglePlay), "");
+    while (!turn(0)) {
+    }
+    const auto placeNow = [&] { return viewer_->motion().surfacesMoved().front().x; };
+    // Each turn shows it a little farther, and another one follows at once.
+    for (int i = 1; i <= 3; ++i) {
+        EXPECT_TRUE(turn(1));
+        EXPECT_EQ(next_.waitSeconds, 0);
+        EXPECT_NEAR(placeNow(), 0.5 * i, 1e-12);
+        EXPECT_FALSE(viewer_->isAtRest());
+    }
+    viewer_->act(ViewerAction::TogglePlay);
+    settle();
+    EXPECT_FALSE(turn(1)) << "it stays, and nothing is drawn";
+    EXPECT_NEAR(placeNow(), 1.5, 1e-12);
+    EXPECT_EQ(viewer_->pictureOf(kSize).surfacesMoved.front().x, placeNow());
+    viewer_->act(ViewerAction::TogglePlay);
+    EXPECT_TRUE(turn(1));
+    EXPECT_NEAR(placeNow(), 2, 1e-12);
+}
+
 TEST_F(ViewerTest, CallsBeforeADatasetDoNothing) {
     auto viewer = Viewer::create({});
     ASSERT_TRUE(viewer) << viewer.error().line();

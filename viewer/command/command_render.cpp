@@ -1,5 +1,6 @@
 // vcp render: pictures without a window: one, one larger than the device draws at once, or a sequence.
 #include <algorithm>
+#include <cmath>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -65,19 +66,30 @@ Result<PaintRows> paintOverOf(const RenderCommand& command, const OpenedScene& o
     return annotationPainter(std::move(annotations), std::move(views), hasDarkBackground(shading));
 }
 
-/// Returns the cameras of a sequence, or the one camera. `isFitted`: it was chosen so that all is seen, and so is each
-/// camera of a turntable.
-Result<std::vector<OrbitCamera>> camerasOf(const RenderCommand& command, OrbitCamera camera, const Box& bounds,
-                                           bool isFitted) {
-    std::vector<OrbitCamera> cameras{camera};
+/// Returns the course of a sequence, or of the one picture. `isFitted`: the camera was chosen so that all is seen, and
+/// so is each camera of a turntable. Errors: Usage, where nothing can be animated; those of readCameras.
+Result<PictureCourse> courseOf(const RenderCommand& command, OrbitCamera camera, const OpenedScene& open,
+                               bool isFitted) {
+    const std::vector<SurfacePath>& paths = open.surfaces.paths;
+    const double period = periodOf(paths);
+    if (command.animate && period == 0)
+        return Error{.code = ErrorCode::Usage,
+                     .message = "--animate goes with a scene in which a surface has a \"path\""};
+    PictureCourse course{.cameras = {camera}, .surfacesMoved = {}};
     if (command.turntable > 0) {
+        const Box bounds = open.bounds();
         if (isFitted) camera.fitAround(bounds, command.size, command.turntable);
-        cameras = turntable(camera, bounds.centre(), command.turntable);
+        course.cameras = turntable(camera, bounds.centre(), command.turntable);
     } else if (!command.path.empty()) {
         VCP_TRY_ASSIGN(const auto keys, readCameras(command.path));
-        cameras = cameraPath(keys, command.frames > 0 ? command.frames : kPathFrames);
+        course.cameras = cameraPath(keys, command.frames > 0 ? command.frames : kPathFrames);
+    } else if (command.animate) {
+        const double all = std::clamp(std::round(period * command.framesPerSecond), 2.0, 1e6);
+        course.cameras.assign(command.frames > 0 ? size_t(command.frames) : size_t(all), camera);
     }
-    return cameras;
+    for (size_t i = 0; command.animate && i < course.cameras.size(); ++i)
+        course.surfacesMoved.push_back(surfacesMovedAt(paths, period * double(i) / double(course.cameras.size())));
+    return course;
 }
 
 /// Refuses options of the output that do not go together.
@@ -91,14 +103,14 @@ Result<void> checkOptions(const RenderCommand& command) {
     if (depth == output || normals == output || (!command.depth.empty() && depth == normals))
         return usage("picture, --depth and --normals must be different files");
     if (command.isVideo() && !command.isSequence())
-        return usage("a video needs --turntable or --path, which say what it shows");
+        return usage("a video needs --turntable, --path or --animate, which say what it shows");
     if (command.isVideo() && command.transparent) return usage("a video has no transparency; leave out --transparent");
     if (command.isVideo() && !hasVideoEncoder()) return usage(kNoVideoEncoder);
     if (command.legend && !isFalseColour(command.render.shading.mode))
         return usage("--legend goes with --shading steps, cells, fetches, level or error");
     if (command.methods.empty()) return {};
     if (command.tile > 0 || command.isSequence())
-        return usage("--methods goes with one picture, without --tile, --turntable and --path");
+        return usage("--methods goes with one picture, without --tile, --turntable, --path and --animate");
     if (command.methods.size() > 1 && !(command.depth.empty() && command.normals.empty()))
         return usage("--depth and --normals are of one method, not of several");
     return {};
@@ -173,10 +185,10 @@ Result<Json> render(const RenderCommand& command) {
     const bool isScenes = command.render.isFit() && scene.camera;
     VCP_TRY_ASSIGN(const auto camera, isScenes ? *scene.camera : command.render.cameraFor(bounds, command.size));
     const bool isFitted = !isScenes && std::holds_alternative<View>(command.render.camera);
-    VCP_TRY_ASSIGN(const auto cameras, camerasOf(command, camera, bounds, isFitted));
-    VCP_TRY_ASSIGN(const auto paintOver, paintOverOf(command, open, cameras));
+    VCP_TRY_ASSIGN(const auto course, courseOf(command, camera, open, isFitted));
+    VCP_TRY_ASSIGN(const auto paintOver, paintOverOf(command, open, course.cameras));
     const OutputRules rules = rulesOf(command, open.filesRead);
-    VCP_TRY(checkOutputs(command, rules, cameras.size()));
+    VCP_TRY(checkOutputs(command, rules, course.cameras.size()));
     RendererOptions options = command.render.rendererOptions();
     options.validation = command.validation;
     VCP_TRY_ASSIGN(auto renderer, createPictureRenderer(options));
@@ -188,7 +200,7 @@ Result<Json> render(const RenderCommand& command) {
     if (!command.methods.empty())
         return Error{.code = ErrorCode::Usage,
                      .message = fmt::format("--methods goes with at most {} M pixels", kMostPixelsAtOnce >> 20)};
-    VCP_TRY_ASSIGN(auto figures, makeTiled(*renderer, request, cameras, paintOver, command, rules));
+    VCP_TRY_ASSIGN(auto figures, makeTiled(*renderer, request, course, paintOver, command, rules));
     VCP_TRY(checkValidation(*renderer));
     return figures;
 }
@@ -327,14 +339,18 @@ Command addRender(CLI::App& vcp) {
                     "video")
         ->type_name("FILE")
         ->excludes(turntable);
+    app->add_flag(
+        "--animate", command->animate,
+        "What moves in a scene, once from beginning to end: OUT-0001.png and so on, or a video; with --path or "
+        "--turntable in their pictures");
     app->add_option("--fps", command->framesPerSecond, "Pictures of a video that are shown in a second")
         ->type_name("N")
         ->check(CLI::Range(1, 240))
         ->capture_default_str();
-    app->add_option(
-           "--frames", command->frames,
-           "Pictures along --path [120]; of one picture: draw it so often again, and report the median time [0; 5 with "
-           "--json]")
+    app->add_option("--frames", command->frames,
+                    "Pictures along --path [120] or of --animate [all of its time]; of one picture: draw it so often "
+                    "again, and report the median time [0; 5 with "
+                    "--json]")
         ->type_name("N")
         ->check(CLI::Range(1, 1'000'000));
     beginGroup(*app, help_group::kLimits);

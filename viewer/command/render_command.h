@@ -23,6 +23,12 @@ constexpr uint64_t kMostPixelsAtOnce = 8 << 20;
 /// The edge of a tile where none is given.
 constexpr uint32_t kUsualTile = 2048;
 
+/// What the pictures of a sequence show, each in its turn.
+struct PictureCourse {
+    std::vector<OrbitCamera> cameras;                    ///< at least one
+    std::vector<std::vector<glm::dvec3>> surfacesMoved;  ///< one for each camera (FrameRequest), or none
+};
+
 struct RenderCommand {
     std::vector<std::string> inputs;
     std::string output;
@@ -38,6 +44,7 @@ struct RenderCommand {
     bool legend = false, scaleBar = false, annotations = true;
     int turntable = 0;
     std::string path;
+    bool animate = false;
     int framesPerSecond = 30;
     std::vector<std::string> methods;  // empty: those of the scene
     std::optional<int> subdivide;
@@ -48,7 +55,7 @@ struct RenderCommand {
 
     /// Figures are wanted with --json, and the first frame, which compiles, would not be one.
     [[nodiscard]] int framesToTime() const { return frames > 0 ? frames : report.json ? 5 : 0; }
-    [[nodiscard]] bool isSequence() const { return turntable > 0 || !path.empty(); }
+    [[nodiscard]] bool isSequence() const { return turntable > 0 || !path.empty() || animate; }
     [[nodiscard]] bool isVideo() const { return isVideoPath(output); }
     /// Returns the name of a picture's file, for one of the command's outputs.
     [[nodiscard]] std::filesystem::path fileOf(const std::string& name, size_t picture) const {
@@ -72,7 +79,7 @@ Result<Json> drawOne(PictureRenderer& renderer, const FrameRequest& request, con
 
 /// Makes pictures in tiles and sequences, with progress; when it is cancelled, finished pictures stay. Reports as
 /// drawOne does.
-Result<Json> makeTiled(PictureRenderer& renderer, const FrameRequest& request, const std::vector<OrbitCamera>& cameras,
+Result<Json> makeTiled(PictureRenderer& renderer, const FrameRequest& request, const PictureCourse& course,
                        const PaintRows& paintOver, const RenderCommand& command, const OutputRules& rules);
 
 }  // namespace vcp

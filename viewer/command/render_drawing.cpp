@@ -215,13 +215,14 @@ Result<Json> drawOne(PictureRenderer& renderer, const FrameRequest& request, con
     return report(command, *first, panels, renderer.device(), request, camera);
 }
 
-Result<Json> makeTiled(PictureRenderer& renderer, const FrameRequest& request, const std::vector<OrbitCamera>& cameras,
+Result<Json> makeTiled(PictureRenderer& renderer, const FrameRequest& request, const PictureCourse& course,
                        const PaintRows& paintOver, const RenderCommand& command, const OutputRules& rules) {
     ProgressDisplay display(command.report.progressStyle(), stderr);
     std::vector<Camera> current;
-    for (const OrbitCamera& each : cameras) current.push_back(each.current());
+    for (const OrbitCamera& each : course.cameras) current.push_back(each.current());
     PictureSequence sequence(renderer, {.request = request,
                                         .cameras = std::move(current),
+                                        .surfacesMoved = course.surfacesMoved,
                                         .files = {command.output, command.depth, command.normals},
                                         .isNumbered = command.isSequence(),
                                         .framesPerSecond = command.framesPerSecond,
@@ -239,12 +240,14 @@ Result<Json> makeTiled(PictureRenderer& renderer, const FrameRequest& request, c
     display.finish();
     const TiledPictureStats& total = sequence.stats();
     if (command.report.json)
-        return toJson(total, cameras.size(), samplesOf(request, command.samples), renderer.device(), request);
+        return toJson(total, course.cameras.size(), samplesOf(request, command.samples), renderer.device(), request);
     const std::string first = command.fileOf(command.output, 1).string();
-    const std::string last = command.fileOf(command.output, cameras.size()).string();
+    const std::string last = command.fileOf(command.output, course.cameras.size()).string();
     const std::string name = first == last ? first : fmt::format("{} to {}", first, last);
-    VCP_TRY(printLineAbout(command.output, fmt::format("{}: {}, {} tiles in {}", name, sizeText(command.size),
-                                                       total.tiles, formatSeconds(1e-3 * total.ms))));
+    const std::string drawn = course.cameras.size() > 1 ? fmt::format("{} pictures", course.cameras.size())
+                                                        : fmt::format("{} tiles", total.tiles);
+    VCP_TRY(printLineAbout(command.output, fmt::format("{}: {}, {} in {}", name, sizeText(command.size), drawn,
+                                                       formatSeconds(1e-3 * total.ms))));
     return Json();
 }
 

@@ -29,6 +29,7 @@ Result<bool> PictureSequence::step() {
 Result<void> PictureSequence::begin() {
     FrameRequest request = o_.request;
     request.camera = o_.cameras[finished_];
+    if (!o_.surfacesMoved.empty()) request.surfacesMoved = o_.surfacesMoved[finished_];
     if (!isVideoPath(o_.files.picture)) {
         VCP_TRY_ASSIGN(png_, PngRows::create(fileOf(o_.files.picture), request.width, request.height, o_.rules));
     } else if (!video_) {

@@ -25,6 +25,8 @@ struct PictureFiles {
 struct PictureSequenceOptions {
     FrameRequest request;         ///< request of each picture, without the camera
     std::vector<Camera> cameras;  ///< one for each picture; at least one
+    /// FrameRequest::surfacesMoved of each picture, in place of the request's; or none.
+    std::vector<std::vector<glm::dvec3>> surfacesMoved = {};
     PictureFiles files;
     bool isNumbered = false;  ///< turn.png stands for turn-0001.png and so on; a video has no number
     int framesPerSecond = 30;

@@ -24,13 +24,16 @@ struct PngRows::Encoder {
     png_structp png = nullptr;
     png_infop info = nullptr;
     std::string complaint;
+    int failed = 0;  // errno of the complaint
 
     [[nodiscard]] Error error(ErrorCode code, const std::string& what) const {
         return {.code = code, .message = what, .file = output.path().string()};
     }
     [[nodiscard]] Error ioError() const {
-        return error(ErrorCode::Io,
-                     complaint.empty() ? std::string("cannot write: ") + std::strerror(errno) : "PNG: " + complaint);
+        // What libpng says of a write that failed is no more than that.
+        const bool isWrite = complaint.empty() || complaint == "Write Error";
+        return error(ErrorCode::Io, isWrite ? std::string("cannot write: ") + std::strerror(failed ? failed : errno)
+                                            : "PNG: " + complaint);
     }
 
     // libpng leaves by longjmp: nothing with a destructor may live in these three functions.
@@ -81,7 +84,9 @@ Result<std::unique_ptr<PngRows>> PngRows::create(const std::filesystem::path& pa
     e.png = png_create_write_struct(
         PNG_LIBPNG_VER_STRING, &e,
         [](png_structp png, png_const_charp what) {
-            static_cast<Encoder*>(png_get_error_ptr(png))->complaint = what;
+            auto& encoder = *static_cast<Encoder*>(png_get_error_ptr(png));
+            encoder.failed = errno;
+            encoder.complaint = what;
             png_longjmp(png, 1);
         },
         [](png_structp, png_const_charp) {});

@@ -143,8 +143,9 @@ Result<void> VideoFile::Encoder::end() {
     do ended = ::waitpid(process, &status, 0);
     while (ended < 0 && errno == EINTR);
     process = 0;
-    if (ended > 0 && WIFEXITED(status) && WEXITSTATUS(status) == 0) return {};
+    // Where a disk is full, ffmpeg says so and ends as if all were well.
     const std::string line = lastLineSaid();
+    if (ended > 0 && WIFEXITED(status) && WEXITSTATUS(status) == 0 && line.empty()) return {};
     return error(ErrorCode::Io, "ffmpeg failed" + (line.empty() ? std::string() : ": " + line));
 }
 

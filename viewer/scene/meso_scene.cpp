@@ -1,6 +1,7 @@
 #include "viewer/scene/meso_scene.h"
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <memory>
 
@@ -81,6 +82,10 @@ public:
         if (!asset.heights)
             return Error{.code = ErrorCode::Usage,
                          .message = fmt::format("{} is for height fields; {} is a solid", kRemeshMethod, asset.name)};
+        if (!d.path.points.empty())
+            return Error{.code = ErrorCode::Usage,
+                         .message = fmt::format(
+                             "{} draws nothing that moves: leave \"path\" out, or take another method", kRemeshMethod)};
         if (!d.normalTexture.empty())
             return Error{.code = ErrorCode::Usage,
                          .message = fmt::format("{} takes no normal texture: leave it out, or take another method",
@@ -127,6 +132,37 @@ void warn(const MesoSurfaceDescription& d, const BaseSurface& base, const Shell&
 
 }  // namespace
 
+double SurfacePath::period() const {
+    if (points.empty()) return 0;
+    return points.front() == points.back() ? seconds : 2 * seconds;
+}
+
+glm::dvec3 SurfacePath::at(double time) const {
+    double length = 0;
+    for (size_t i = 1; i < points.size(); ++i) length += glm::distance(points[i - 1], points[i]);
+    const double along = std::fmod(time, period()) / seconds;
+    double left = length * (along > 1 ? 2 - along : along);
+    for (size_t i = 1; i < points.size(); ++i) {
+        const double step = glm::distance(points[i - 1], points[i]);
+        if (left < step) return glm::mix(points[i - 1], points[i], left / step);
+        left -= step;
+    }
+    return points.back();
+}
+
+double periodOf(std::span<const SurfacePath> paths) {
+    double longest = 0;
+    for (const SurfacePath& path : paths) longest = std::max(longest, path.period());
+    return longest;
+}
+
+std::vector<glm::dvec3> surfacesMovedAt(std::span<const SurfacePath> paths, double time) {
+    std::vector<glm::dvec3> moved;
+    if (periodOf(paths) == 0) return moved;
+    for (const SurfacePath& path : paths) moved.push_back(path.points.empty() ? glm::dvec3(0) : path.at(time));
+    return moved;
+}
+
 Error ScenePlace::blamed(Error error) const {
     if (file.empty() || error.code != ErrorCode::Usage) return error;
     const std::string about = error.file.empty() ? std::string() : error.file + ": ";
@@ -162,6 +198,8 @@ Result<MesoScene> makeMesoScene(std::span<const MesoSurfaceDescription> descript
     Remeshing remeshing;
     std::map<std::pair<std::string, double>, std::shared_ptr<const Appearance>> appearances;
     for (const MesoSurfaceDescription& d : descriptions) {
+        SurfacePath& path = scene.paths.emplace_back(d.path);
+        for (glm::dvec3& point : path.points) point -= d.place;
         const auto asset = openMesoAsset(d.asset);
         if (!asset) return d.from.blamed(asset.error());
         const auto base = baseOf(d);
@@ -191,6 +229,8 @@ Result<MesoScene> makeMesoScene(std::span<const MesoSurfaceDescription> descript
         }
         warn(d, *base, *shell, scene.warnings);
         scene.bounds = scene.bounds.joined({shell->low, shell->high});
+        for (const glm::dvec3& moved : path.points)
+            scene.bounds = scene.bounds.joined({shell->low + moved, shell->high + moved});
         MesoSurface surface;
         auto colours = textures.colours(d.colourTexture), normals = textures.normals(d.normalTexture);
         for (const auto* texture : {&colours, &normals})

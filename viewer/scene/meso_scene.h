@@ -42,6 +42,20 @@ inline std::span<const std::string_view> surfaceMethodNames() {
     return names;
 }
 
+/// Points that a surface goes along at even speed: to the last one and back again, or round and round where that is the
+/// first one.
+struct SurfacePath {
+    static constexpr double kUsualSeconds = 8;
+
+    std::vector<glm::dvec3> points;  ///< none: it stays; else at least two
+    double seconds = kUsualSeconds;  ///< from the first to the last, above 0
+
+    /// Returns the time after which it begins again; 0 where it stays.
+    [[nodiscard]] double period() const;
+    /// Returns the place at a time from 0 on. Precondition: there are points.
+    [[nodiscard]] glm::dvec3 at(double time) const;
+};
+
 struct MesoSurfaceDescription {
     std::string asset;           ///< as openMesoAsset
     meso::MethodOptions method;  ///< its name may be kRemeshMethod
@@ -53,6 +67,7 @@ struct MesoSurfaceDescription {
     double offset = 0;       ///< by how much the slab's bottom lies over the base, in the base's units; below 0 under
     bool withFilter = true;  ///< kRemeshMethod: with coarser levels of the heights
     glm::dvec3 place{0};     ///< the base's origin, world
+    SurfacePath path;        ///< of the origin, world; not of kRemeshMethod
     double scale = 1;        ///< scale of the base, of mesh files too
     UpAxis up = UpAxis::Z;   ///< which way the base's z points; mesh files stay as they are
     glm::vec3 colour{0.8f};  ///< encoded
@@ -67,9 +82,15 @@ inline glm::dvec3 turnedUp(glm::dvec3 p, UpAxis up) { return up == UpAxis::Z ? p
 
 struct MesoScene {
     std::vector<MesoSurface> surfaces;
-    Box bounds = Box::nothing();
+    std::vector<SurfacePath> paths;  ///< of the surfaces, one each, from where they lie: FrameRequest::surfacesMoved
+    Box bounds = Box::nothing();     ///< wherever they go
     std::vector<std::string> warnings;  ///< properties of shells and maps that a picture may show
 };
+
+/// Returns the longest period of the paths; 0: nothing moves.
+double periodOf(std::span<const SurfacePath> paths);
+/// Returns FrameRequest::surfacesMoved at a time from 0 on; empty where nothing moves.
+std::vector<glm::dvec3> surfacesMovedAt(std::span<const SurfacePath> paths, double time);
 
 /// Makes the surfaces. Errors: those of the assets, methods, bases and shells, with the file where there is one.
 Result<MesoScene> makeMesoScene(std::span<const MesoSurfaceDescription> descriptions);

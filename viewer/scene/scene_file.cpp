@@ -26,6 +26,8 @@ using Json = nlohmann::json;
 
 constexpr size_t kLargestFile = 1 << 20;
 constexpr size_t kMostSurfaces = 64;
+constexpr size_t kMostPathPoints = 1000;                    // of a surface
+constexpr double kShortestPath = 0.1, kLongestPath = 3600;  // seconds
 constexpr int kDeepestScene = 16;
 constexpr int kMostSteps = 4096;                             // of relief mapping
 constexpr double kSmallestCell = 0.25, kLargestCell = 1000;  // pixels, of remeshing
@@ -190,9 +192,10 @@ private:
         MesoSurfaceDescription made;
         made.method.name = "boxes";
         if (!isObject(json, at)) return made;
-        onlyKeys(json, at, {"asset",  "surface",    "subdivide",      "tiles",  "height", "translate", "scale", "up",
-                            "colour", "texture",    "normal_texture", "method", "cell",   "grid",      "cones", "steps",
-                            "rank",   "directions", "base",           "far",    "offset", "filter"});
+        onlyKeys(json, at,
+                 {"asset",  "surface",    "subdivide",      "tiles",  "height", "translate", "scale", "up",
+                  "colour", "texture",    "normal_texture", "method", "cell",   "grid",      "cones", "steps",
+                  "rank",   "directions", "base",           "far",    "offset", "filter",    "path",  "seconds"});
         if (!json.contains("asset"))
             wrong(at, "\"asset\" is missing");
         else
@@ -208,6 +211,9 @@ private:
         if (json.contains("offset")) made.offset = number(json["offset"], at + "/offset");
         if (json.contains("filter")) made.withFilter = flag(json["filter"], at + "/filter");
         if (json.contains("translate")) made.place = triple(json["translate"], at + "/translate");
+        if (json.contains("path")) made.path.points = path(json["path"], at + "/path");
+        if (json.contains("path") && !json.contains("translate") && !error_) made.place = made.path.points.front();
+        if (json.contains("seconds")) made.path.seconds = seconds(json["seconds"], at + "/seconds");
         if (json.contains("scale")) made.scale = scale(json["scale"], at + "/scale");
         if (json.contains("up")) made.up = upAxis(json["up"], at + "/up");
         if (json.contains("colour")) made.colour = colour(json["colour"], at + "/colour");
@@ -225,6 +231,21 @@ private:
         if (json.contains("base")) made.withBase = flag(json["base"], at + "/base");
         if (json.contains("far")) made.withFar = flag(json["far"], at + "/far");
         return made;
+    }
+
+    std::vector<glm::dvec3> path(const Json& json, const std::string& at) {
+        std::vector<glm::dvec3> points;
+        if (!json.is_array() || json.size() < 2 || json.size() > kMostPathPoints)
+            return wrong(at, fmt::format("must be a list of 2 to {} points", kMostPathPoints)), points;
+        for (size_t i = 0; i < json.size(); ++i) points.push_back(triple(json[i], fmt::format("{}/{}", at, i)));
+        return points;
+    }
+
+    double seconds(const Json& json, const std::string& at) {
+        const double time = number(json, at);
+        if (!(time >= kShortestPath && time <= kLongestPath))
+            wrong(at, fmt::format("must be from {} to {} seconds", kShortestPath, kLongestPath));
+        return time;
     }
 
     /// Reads a name, or a file, which is relative to the scene's folder.

@@ -40,6 +40,10 @@ OrderedJson surfaceJson(const MesoSurfaceDescription& surface) {
     put("offset", surface.offset, usual.offset);
     put("filter", surface.withFilter, usual.withFilter);
     if (surface.place != usual.place) json["translate"] = triple(surface.place);
+    if (!surface.path.points.empty()) {
+        for (const glm::dvec3& point : surface.path.points) json["path"].push_back(triple(point));
+        put("seconds", surface.path.seconds, usual.path.seconds);
+    }
     put("scale", surface.scale, usual.scale);
     if (surface.up != usual.up) json["up"] = "y";
     if (surface.colour != usual.colour)

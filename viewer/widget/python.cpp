@@ -4,9 +4,11 @@
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
 
 #include <algorithm>
 #include <cstring>
+#include <filesystem>
 #include <iterator>
 #include <optional>
 #include <tuple>
@@ -177,9 +179,9 @@ vcp_colour colourNamed(const std::string& name) {
     return vcp_colour(found - std::begin(kNames));
 }
 
-py::dict buildWith(const std::vector<std::string>& inputs, const std::string& output, double cell, double error,
-                   uint64_t memoryBytes, uint32_t threads, const std::string& colour, const std::string& format,
-                   const py::object& progress) {
+py::dict buildWith(const std::vector<std::filesystem::path>& files, const std::filesystem::path& output, double cell,
+                   double error, uint64_t memoryBytes, uint32_t threads, const std::string& colour,
+                   const std::string& format, const py::object& progress) {
     using namespace py::literals;
     vcp_build_options options = sized<vcp_build_options>();
     options.colour = colourNamed(colour);
@@ -188,6 +190,8 @@ py::dict buildWith(const std::vector<std::string>& inputs, const std::string& ou
     options.error = error;
     options.memory_bytes = memoryBytes;
     options.threads = threads;
+    std::vector<std::string> inputs;
+    for (const std::filesystem::path& file : files) inputs.push_back(file.string());
     std::exception_ptr thrown;
     // Returning false cancels; so does an exception, which is passed on.
     const auto tell = [&](const vcp_progress& at) {
@@ -204,7 +208,7 @@ py::dict buildWith(const std::vector<std::string>& inputs, const std::string& ou
     vcp_build_report report{};
     try {
         const py::gil_scoped_release others;
-        report = build(inputs, output, tell, options);
+        report = build(inputs, output.string(), tell, options);
     } catch (const Error&) {
         if (!thrown) throw;
     }
@@ -213,13 +217,14 @@ py::dict buildWith(const std::vector<std::string>& inputs, const std::string& ou
                     "cell"_a = report.cell, "certified_error"_a = report.certified_error, "seconds"_a = report.seconds);
 }
 
-/// One path, or several with a matrix of 16 numbers each, row by row, or none.
-using Paths = std::variant<std::string, std::vector<std::pair<std::string, std::optional<std::array<double, 16>>>>>;
+/// One path, or several with a matrix of 16 numbers each, row by row, or none. A path is a str or an os.PathLike.
+using Paths = std::variant<std::filesystem::path,
+                           std::vector<std::pair<std::filesystem::path, std::optional<std::array<double, 16>>>>>;
 
 std::vector<Placed> placedOf(const Paths& paths) {
     std::vector<Placed> placed;
     for (const auto& [each, matrix] : std::get<1>(paths))
-        placed.push_back({each, matrix.value_or(std::array<double, 16>{})});
+        placed.push_back({each.string(), matrix.value_or(std::array<double, 16>{})});
     return placed;
 }
 
@@ -227,8 +232,8 @@ std::vector<Placed> placedOf(const Paths& paths) {
 void openTelling(Context& context, const Paths& paths, const py::object& progress) {
     {
         const py::gil_scoped_release others;
-        if (const auto* path = std::get_if<std::string>(&paths))
-            context.startOpen(*path);
+        if (const auto* path = std::get_if<std::filesystem::path>(&paths))
+            context.startOpen(path->string());
         else
             context.startOpen(placedOf(paths));
     }
@@ -249,6 +254,7 @@ void openTelling(Context& context, const Paths& paths, const py::object& progres
 /// Opens a view that keeps its context alive.
 std::unique_ptr<View> openView(const Paths& paths, uint32_t width, uint32_t height, uint64_t gpuBytes,
                                const std::string& device, bool zIsUp, const py::object& progress) {
+    if (width == 0 || height == 0) throw Error(VCP_USAGE, "a picture has 1 to 16384 pixels a side");
     vcp_context_options options = sized<vcp_context_options>();
     options.gpu_bytes = gpuBytes;
     options.device = device.c_str();

@@ -176,7 +176,8 @@ Result<void> pick(vcp_view& view, double x, double y, vcp_pick* out) {
         const auto surfaces = view.viewer->renderer().surfaces();
         VCP_TRY_ASSIGN(const auto hit,
                        view.context->finest->cast(ray, sections, view.viewer->hidden(),
-                                                  pickOnSurfaces(surfaces, ray.origin, ray.direction, sections)));
+                                                  pickOnSurfaces(surfaces, ray.origin, ray.direction, sections,
+                                                                 view.viewer->motion().surfacesMoved())));
         if (hit) {
             picked.hit = 1;
             for (int i = 0; i < 3; ++i) picked.position[i] = hit->position[i], picked.normal[i] = hit->normal[i];

@@ -103,7 +103,7 @@ Result<void> writeDemoMesh(const fs::path& path) {
             triangle(here + j, next + j, next + beside);
             triangle(here + j, next + beside, here + beside);
         }
-    return writeFile(path, OutputKind::Ply, std::span<const std::byte>(bytes));
+    return writeFile(path, OutputKind::Ply, std::span<const std::byte>(bytes), {.overwrite = true});
 }
 
 Result<fs::path> demoMesh() {

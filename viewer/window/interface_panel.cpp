@@ -114,6 +114,9 @@ void Interface::layOutView() {
     static constexpr const char* kAxes[] = {"Y is up", "Z is up"};
     int up = camera.up == UpAxis::Y ? 0 : 1;
     if (choiceRow(*look_, "up", kAxes, up, {"The axis that points up", "U"})) session_->act(ViewerAction::ToggleUpAxis);
+    if (const SurfaceMotion& motion = session_->viewer().motion(); motion.isThere())
+        actionButton(motion.isPlaying() ? "Pause" : "Play", ViewerAction::TogglePlay,
+                     {"What moves in the scene goes on, or stays", "Space"}, ImGui::GetContentRegionAvail().x);
     layOutBookmarks();
     caption(*look_, "Theme");
     static constexpr const char* kThemes[] = {"System", "Light", "Dark"};

@@ -304,8 +304,9 @@ void ViewSession::clickAt(glm::dvec2 pixel) {
     const Ray ray{through.origin, through.direction};
     pickedFor_ = clicks_;
     const std::vector<SectionPlane> sections = viewer_->sections();
-    pick_ = std::async(std::launch::async, [finest = finest_, ray, sections, hidden = viewer_->hidden(),
-                                            onSurface = pickOnSurfaces(surfaces, ray.origin, ray.direction, sections)] {
+    const auto onSurface =
+        pickOnSurfaces(surfaces, ray.origin, ray.direction, sections, viewer_->motion().surfacesMoved());
+    pick_ = std::async(std::launch::async, [finest = finest_, ray, sections, hidden = viewer_->hidden(), onSurface] {
         return finest->cast(ray, sections, hidden, onSurface);
     });
 }
@@ -427,6 +428,7 @@ void ViewSession::exportMeasurement() {
     const auto json =
         writeFile(name + ".json", OutputKind::JsonText, std::string_view(measurementJson(measurement_, unit())));
     if (!table || !json) return say((table ? json : table).error().line());
+    writtenMeasurement_ = measurementCsv(measurement_);
     note(fmt::format("written: {}.csv and .json in {}", name, workingFolder()));
 }
 

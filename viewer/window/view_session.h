@@ -156,6 +156,10 @@ public:
     [[nodiscard]] bool showsFeedback() const { return showsFeedback_; }
     void showFeedback(bool show);
     [[nodiscard]] Measurement& measurement() { return measurement_; }
+    /// Whether anything is measured that exportMeasurement() has not written.
+    [[nodiscard]] bool hasUnwrittenMeasurement() const {
+        return !measurement_.empty() && measurementCsv(measurement_) != writtenMeasurement_;
+    }
     [[nodiscard]] bool isPicking() const { return pick_.valid(); }
     /// Returns the unit of what is shown, for lengths.
     [[nodiscard]] const std::optional<LengthUnit>& unit() const { return options_.render.unit; }
@@ -264,6 +268,7 @@ private:
     OrbitCamera home_;       // the camera that it opened with
     LegendSubject subject_;  // all that is open, in the order of Viewer::hidden()
     Measurement measurement_;
+    std::string writtenMeasurement_;  // as a table
     Clicks clicks_ = Clicks::Nothing, pickedFor_ = Clicks::Nothing;
     SceneFile scene_;  // what is shown, as a scene that can be saved
     std::vector<Annotation> points_;

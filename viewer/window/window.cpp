@@ -321,6 +321,7 @@ private:
         if (action == GLFW_RELEASE) return;
         session_->note("");
         opensPage_ = false;
+        isAskedToClose_ = isAskedToClose_ && key == GLFW_KEY_ESCAPE;
         if (interface_.takesText()) {
             pageKey(key, mods);
             return layOut();
@@ -431,6 +432,8 @@ private:
             toggleFly();
         else if (session_->clicks() != ViewSession::Clicks::Nothing)
             session_->setClicks(ViewSession::Clicks::Nothing);
+        else if (session_->hasUnwrittenMeasurement() && !std::exchange(isAskedToClose_, true))
+            session_->note("what is measured is not written: Ctrl+E writes it, Esc closes without");
         else
             glfwSetWindowShouldClose(window_, GLFW_TRUE);
     }
@@ -477,7 +480,8 @@ private:
     glm::dvec2 pressedAt_{0};
     double pressedTime_ = 0;
     bool isClick_ = false, isDragging_ = false;
-    bool opensPage_ = false;  // the last key did: its character is not typed into the page
+    bool opensPage_ = false;       // the last key did: its character is not typed into the page
+    bool isAskedToClose_ = false;  // and the last key was Esc
     glm::dvec3 held_{0};
     bool mustPresent_ = true, isRescaled_ = false;
     bool darkShown_ = true;

@@ -209,6 +209,29 @@ TEST_F(HostSurfaces, TilesAreCutFromTheWholeAndBytesFromTheBudget) {
     EXPECT_TRUE(host_->open({{cube.dataset, cube.source, {}}}, surfaces));
 }
 
+TEST_F(HostSurfaces, WhatIsMovedIsSeenAsIfItLayThere) {
+    const glm::dvec3 by(0.25, -0.5, 0.375);
+    const MesoSurface ground = mesoSurface(relief(), "pyramid", "quad", 0.2);
+    const auto ball = [](glm::dvec3 place) { return mesoSurface(solidAsset("ball"), "boxes", "quad", 1, 2, place); };
+    for (const Camera& camera : views()) {
+        FrameRequest request = lookFrom(camera);
+        request.shading.shadows = true;
+        request.sections = {{{0, 1, 0}, -0.9}};
+        setSurfaces({ground, ball(by)});
+        const test::Planes onHost = test::drawnBy(*host_, request, 1), onDevice = test::drawnBy(*renderer_, request, 1);
+        setSurfaces({ground, ball({0, 0, 0})});
+        const test::Planes unmoved = test::drawnBy(*host_, request, 1);
+        request.surfacesMoved = {{0, 0, 0}, by};
+        for (const auto& [there, moved] : {std::pair(onHost, test::drawnBy(*host_, request, 1)),
+                                           std::pair(onDevice, test::drawnBy(*renderer_, request, 1))}) {
+            const Difference d = test::compare(there, moved, 0.2);
+            EXPECT_GT(d.hits, 1000u);
+            EXPECT_EQ(d.state + d.depth + d.normal + d.colour, 0u);
+            EXPECT_GT(test::compare(unmoved, moved, 0.2).state, 100u);
+        }
+    }
+}
+
 TEST_F(HostSurfaces, IsCancelledBetweenTiles) {
     setSurfaces({mesoSurface(plateau(), "boxes", "quad", 0.2)});
     const FrameRequest request = lookFrom(views()[0]);

@@ -148,6 +148,25 @@ TEST_F(MesoCommands, TheScenesOfTheDocumentsAreDrawn) {
     }
 }
 
+TEST_F(MesoCommands, WhatMovesIsAnimated) {
+    const std::string scene = VCP_SOURCE_DIR "/docs/scenes/maze_ball.json",
+                      how = " --samples 1 --size 64x48 --progress none";
+    const auto drawn = [&](const std::string& options) {
+        return run("render " + scene + options + " -o " + path("a.png") + how + " --depth " + path("a.pfm"));
+    };
+    const Ran ran = drawn(" --animate --frames 3");
+    ASSERT_EQ(ran.status, 0) << ran.err;
+    const std::string first = contentOf(path("a-0001.pfm")), second = contentOf(path("a-0002.pfm"));
+    EXPECT_TRUE(first != second);
+    EXPECT_TRUE(second != contentOf(path("a-0003.pfm")));
+    EXPECT_FALSE(std::filesystem::exists(path("a-0004.png")));
+    ASSERT_EQ(drawn("").status, 0);
+    EXPECT_TRUE(contentOf(path("a.pfm")) == first) << "at the beginning it lies where the scene says";
+    const Ran none = run("render " VCP_SOURCE_DIR "/docs/scenes/kitten_wall.json --animate -o " + path("a.png") + how);
+    EXPECT_EQ(none.status, 2);
+    EXPECT_NE(none.err.find("\"path\""), std::string::npos) << none.err;
+}
+
 TEST_F(MesoCommands, TheDogOfTheDocumentsIsDrawn) {
     const auto makeScan = std::filesystem::path(VCP_EXECUTABLE).parent_path() / "make_scan";
     ASSERT_EQ(std::system((makeScan.string() + " --shape dog --triangles 10000 -o " + path("dog.obj")).c_str()), 0);

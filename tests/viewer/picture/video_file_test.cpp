@@ -77,6 +77,24 @@ TEST_F(VideoFileTest, WhatTheEncoderSaysIsTheError) {
     EXPECT_TRUE(files().empty());
 }
 
+TEST_F(VideoFileTest, WhatTheEncoderSaysIsAnErrorHoweverItEnds) {
+    const VideoFormat format{.width = 8, .height = 8};
+    Result<std::unique_ptr<VideoFile>> video = std::unique_ptr<VideoFile>();
+    {
+        // As ffmpeg does where the disk is full.
+        const test::EncoderInPath encoder(
+            folder_.path(), std::string(test::EncoderInPath::kCopies) + "echo 'No space left on device' >&2\n");
+        video = VideoFile::create(folder_ / "a.mp4", format);
+    }
+    ASSERT_TRUE(video) << video.error().line();
+    ASSERT_TRUE((*video)->add(frameOf(format, {})));
+    const auto finished = (*video)->finish();
+    ASSERT_FALSE(finished);
+    EXPECT_NE(finished.error().line().find("No space left on device"), std::string::npos);
+    video->reset();
+    EXPECT_TRUE(files().empty());
+}
+
 TEST_F(VideoFileTest, AnEncoderThatGoesAwayIsNoSignal) {
     const test::EncoderInPath encoder(folder_.path(), "echo 'disk full' >&2\nexit 1\n");
     const VideoFormat format{.width = 1000, .height = 1000};

@@ -75,6 +75,9 @@ TEST(SceneFile, WhatIsWrongIsSaidWithItsLine) {
         {beside("\"mesostructure\": [{\"asset\": \"beads\",\n\"texture\": 7}]"), 4, "\"texture\""},
         {beside("\"mesostructure\": [{\"asset\": \"beads\",\n\"normal_texture\": \"\"}]"), 4, "\"normal_texture\""},
         {beside("\"mesostructure\": [{\n\"asset\": \"brick\"}]"), 4, "\"asset\" must be"},
+        {beside("\"mesostructure\": [{\"asset\": \"beads\",\n\"path\": [[1, 2, 3]]}]"), 4, "2 to 1000 points"},
+        {beside("\"mesostructure\": [{\"asset\": \"beads\",\n\"path\": [[1, 2, 3], 4]}]"), 4, "three numbers"},
+        {beside("\"mesostructure\": [{\"asset\": \"beads\",\n\"seconds\": 0}]"), 4, "seconds"},
         {beside("\"lights\": [{}, {}, {}, {}, {}]"), 3, "at most 4 lights"},
         {beside("\"lights\": [{\"direction\": [1, 0, 0], \"strength\": -1}]"), 3, "must be from 0 to 10"},
         {beside("\"lights\": [{}]"), 3, "direction"},
@@ -278,6 +281,44 @@ TEST(SceneFile, WhatCannotBeRemeshedIsSaid) {
     EXPECT_NE(errorOf(R"("asset": "bead")").find("remesh is for height fields; bead is a solid"), std::string::npos);
     EXPECT_NE(errorOf(R"("asset": "fbm", "normal_texture": "n.png")").find("remesh takes no normal texture"),
               std::string::npos);
+}
+
+TEST(SceneFile, SurfacesGoAlongPaths) {
+    const auto scene = sceneFromJson(R"({"mesostructure": [
+        {"asset": "ball", "path": [[1, 0, 0], [1, 3, 0], [2, 3, 0]], "seconds": 2},
+        {"asset": "ball", "translate": [5, 0, 0], "path": [[0, 0, 0], [0, 0, 2], [0, 0, 0]]},
+        {"asset": "ball"}]})",
+                                     "m.json", {});
+    ASSERT_TRUE(scene) << scene.error().line();
+    EXPECT_EQ(sceneToJson(*sceneFromJson(sceneToJson(*scene), "m.json", {})), sceneToJson(*scene));
+    const auto &open = scene->surfaces[0], &closed = scene->surfaces[1];
+    EXPECT_EQ(open.place, glm::dvec3(1, 0, 0));
+    EXPECT_EQ(closed.place, glm::dvec3(5, 0, 0));
+    // Even speed, to the end and back.
+    EXPECT_EQ(open.path.period(), 4);
+    for (const auto& [time, at] : {std::pair(0.0, glm::dvec3(1, 0, 0)), std::pair(1.0, glm::dvec3(1, 2, 0)),
+                                   std::pair(1.75, glm::dvec3(1.5, 3, 0)), std::pair(2.25, glm::dvec3(1.5, 3, 0)),
+                                   std::pair(7.0, glm::dvec3(1, 2, 0))})
+        EXPECT_LT(glm::distance(open.path.at(time), at), 1e-12) << time;
+    EXPECT_EQ(closed.path.period(), 8);
+    for (const auto& [time, z] : {std::pair(2.0, 1.0), std::pair(4.0, 2.0), std::pair(6.0, 1.0), std::pair(8.0, 0.0)})
+        EXPECT_NEAR(closed.path.at(time).z, z, 1e-12);
+    const auto made = makeMesoScene(scene->surfaces);
+    ASSERT_TRUE(made) << made.error().line();
+    EXPECT_EQ(periodOf(made->paths), 8);
+    const auto moved = surfacesMovedAt(made->paths, 1);
+    ASSERT_EQ(moved.size(), 3u);
+    EXPECT_EQ(moved[0], glm::dvec3(0, 2, 0));
+    EXPECT_EQ(moved[1], glm::dvec3(-5, 0, 0.5)) << "from where it lies";
+    EXPECT_EQ(moved[2], glm::dvec3(0));
+    const MesoSurfaceDescription still = scene->surfaces[2];
+    const auto alone = makeMesoScene({&still, 1});
+    EXPECT_EQ(periodOf(alone->paths), 0);
+    EXPECT_TRUE(surfacesMovedAt(alone->paths, 1).empty());
+    EXPECT_LT(made->bounds.low.x, -0.5) << "wherever they go is within the bounds";
+    MesoSurfaceDescription remeshed = open;
+    remeshed.asset = "ridged", remeshed.method.name = kRemeshMethod;
+    EXPECT_FALSE(makeMesoScene({&remeshed, 1}));
 }
 
 // Whatever is cut off or in the wrong place is an error or a scene, nothing else.

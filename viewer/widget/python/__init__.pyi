@@ -1,5 +1,6 @@
 """What the module vcp offers, for editors and type checkers."""
 
+from os import PathLike
 from types import TracebackType
 from typing import Callable, List, Optional, Sequence, Tuple, Type, TypedDict, Union
 
@@ -13,7 +14,8 @@ Colour = Sequence[float]  # red, green, blue, opacity, 0 to 1
 Line = Tuple[Sequence[Point], Colour, float]  # points, colour, width in pixels
 Matrix = Sequence[float]  # 16 numbers, row by row
 Caps = Union[bool, str]  # True: of closed parts; "all"
-Path = Union[str, Sequence[Tuple[str, Optional[Matrix]]]]
+File = Union[str, PathLike[str]]
+Path = Union[File, Sequence[Tuple[File, Optional[Matrix]]]]
 
 __version__: str
 
@@ -138,7 +140,7 @@ class View:
     def __exit__(self, kind: Optional[Type[BaseException]] = None, value: Optional[BaseException] = None,
                  traceback: Optional[TracebackType] = None) -> None: ...
 
-def build(inputs: Sequence[str], output: str, cell: float = 0.0, error: float = 0.0, memory_bytes: int = 0,
+def build(inputs: Sequence[File], output: File, cell: float = 0.0, error: float = 0.0, memory_bytes: int = 0,
           threads: int = 0, colour: str = "auto", format: str = "",
           progress: Optional[Callable[[str, float], Optional[bool]]] = None) -> Report: ...
 def open(path: Path, width: int = 1280, height: int = 720, gpu_bytes: int = 0, device: str = "",
