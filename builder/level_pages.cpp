@@ -52,7 +52,8 @@ Result<BuiltPage> buildPage(const LevelSettings& settings, const LatticeMesh& me
 uint64_t bytesOf(const LatticeMesh& mesh) {
     return mesh.positions.size() * (sizeof(glm::i32vec3) + 2 * sizeof(uint32_t)) +
            mesh.triangles.size() * (sizeof mesh.triangles[0] + sizeof(float)) +
-           mesh.textures.size() * sizeof mesh.textures[0] + mesh.cornerNormals.size() * sizeof mesh.cornerNormals[0];
+           mesh.textures.size() * (sizeof mesh.textures[0] + sizeof mesh.tints[0]) +
+           mesh.cornerNormals.size() * sizeof mesh.cornerNormals[0];
 }
 
 /// Measures of triangles, each counted by itself; in cells.
@@ -100,7 +101,7 @@ Result<BuiltPage> builtPage(const LevelSettings& settings, uint64_t code, const 
     page.entry.morton = code;
     page.entry.level = uint8_t(settings.grid.level);
     page.entry.leaves = encoded.leaves;
-    page.entry.slabLeaves = encoded.slabLeaves;
+    page.entry.slabLeaves = encoded.slabLeaves & 0xffffffu;
     page.entry.hardLeaves = encoded.hardLeaves;
     page.entry.parts = encoded.parts;
     page.entry.certifiedError =

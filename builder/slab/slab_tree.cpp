@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 #include "builder/slab/slab_error.h"
 #include "octree/surface/morton.h"
@@ -28,6 +29,7 @@ public:
             const glm::ivec3 at(mortonDecode(code));
             tree_.occupied[size_t(at.x + tree_.cells * (at.y + tree_.cells * at.z))] = 1;
         }
+        tree_.colourError = colourError();
         return std::move(tree_);
     }
 
@@ -64,10 +66,34 @@ private:
         const Run eighths = eighthsOf(level, index);
         SlabLeaf leaf = leafOf(tree_.nodes[node].box, level, index, eighths);
         // Halves of cells are never parted: their error is small enough whatever lies in them.
-        if (level > 0 || isGood(leaf, index, eighths)) return tree_.makeSlab(node, leaf);
+        if (level > 0 || isGood(leaf, index, eighths)) return makeSlab(node, leaf, level, index);
         const uint32_t children = tree_.addChildren(node);
         for (size_t i = eighths.first; i < eighths.end; ++i)
             buildCell(children + (levels_[level + 1]->codes[i] & 7u), level + 1, i);
+    }
+
+    void makeSlab(uint32_t node, const SlabLeaf& leaf, size_t level, size_t index) {
+        tree_.makeSlab(node, leaf);
+        const SurfaceCells& cells = *levels_[level];
+        if (cells.tints.empty()) return;
+        const double area = std::ldexp(double(cells.cells[index].area), -2 * int(level));
+        differences_.push_back({rmsDifference(cells.tints[index], leaf.colour), area});
+    }
+
+    /// A slab's colour error, and the area of the surface in it, in squares of the page's cells.
+    struct Difference {
+        double deltaE, area;
+    };
+
+    [[nodiscard]] ColourError colourError() {
+        if (differences_.empty()) return {};
+        std::sort(differences_.begin(), differences_.end(),
+                  [](const Difference& a, const Difference& b) { return a.deltaE < b.deltaE; });
+        double all = 0, below = 0;
+        for (const Difference& each : differences_) all += each.area;
+        size_t at = 0;
+        while (at + 1 < differences_.size() && (below += differences_[at].area) < 0.95 * all) ++at;
+        return {.p95 = differences_[at].deltaE, .max = differences_.back().deltaE};
     }
 
     /// Whether a cell needs no finer leaves. Sets the leaf's error.
@@ -102,6 +128,7 @@ private:
     std::array<const SurfaceCells*, 3> levels_;  ///< cells, halves, quarters
     uint32_t log2Cells_;
     PageTree tree_;
+    std::vector<Difference> differences_;
     std::vector<uint32_t> octants_;
     std::vector<SurfaceQuarter> quarters_;
 };

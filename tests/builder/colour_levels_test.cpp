@@ -14,6 +14,7 @@
 #include <glm/vec4.hpp>
 
 #include "builder/build.h"
+#include "builder/stream/colour_difference.h"
 #include "builder/stream/colour_encoding.h"
 #include "octree/page/page_draft.h"
 #include "octree/page_reader.h"
@@ -49,6 +50,7 @@ struct PlacedSlab {
     Box box;
     uint32_t level;
     uint32_t colour;
+    uint64_t page = 0;
 };
 
 /// What there is to see in a file: the triangles of the finest level in small parts, and all slabs.
@@ -73,7 +75,9 @@ public:
             if (entry.childMask == 0) {
                 addTriangles(*view, box, cell);
             } else {
+                const size_t first = slabs.size();
                 addSlabs(*view, view->header.root, box, entry.level);
+                for (size_t k = first; k < slabs.size(); ++k) slabs[k].page = i;
             }
         }
     }
@@ -97,6 +101,8 @@ public:
             }
         return in;
     }
+
+    [[nodiscard]] const Dataset& data() const { return data_; }
 
     std::vector<Part> parts;
     std::vector<PlacedSlab> slabs;
@@ -202,6 +208,48 @@ protected:
         return compared;
     }
 
+    /// Compares the colour errors of pages with what follows from the finest surface in their slabs. Returns how many
+    /// pages it compared.
+    static int compareErrors(const Shown& shown) {
+        struct Difference {
+            double deltaE, area;
+        };
+        std::map<uint64_t, std::vector<Difference>> byPage;
+        const auto inSlabs = shown.partsInSlabs();
+        for (size_t i = 0; i < shown.slabs.size(); ++i) {
+            const PlacedSlab& slab = shown.slabs[i];
+            glm::dvec3 light;
+            for (int k = 0; k < 3; ++k) light[k] = srgbToLinear(double(slab.colour >> 8 * k & 255u) / 255);
+            Difference sum{0, 0};
+            for (const size_t number : inSlabs[i]) {
+                const Part& part = shown.parts[number];
+                sum.deltaE += part.area * std::pow(colourDifference(glm::dvec3(part.light), light), 2);
+                sum.area += part.area;
+            }
+            if (sum.area > 0) byPage[slab.page].push_back({std::sqrt(sum.deltaE / sum.area), sum.area});
+        }
+        int compared = 0;
+        for (auto& [page, slabs] : byPage) {
+            if (slabs.size() < 30) continue;
+            ++compared;
+            std::ranges::sort(slabs, {}, &Difference::deltaE);
+            double all = 0, above = 0, p90 = 0, p99 = 0, whole = 0;
+            for (const Difference& each : slabs) all += each.area;
+            for (auto each = slabs.rbegin(); each != slabs.rend(); ++each) {
+                above += each->area;
+                if (p99 == 0 && above > 0.01 * all) p99 = each->deltaE;
+                if (p90 == 0 && above > 0.1 * all) p90 = each->deltaE;
+                if (each->area > 0.02 * all) whole = std::max(whole, each->deltaE);
+            }
+            const PageEntry& entry = shown.data().pages[page];
+            EXPECT_GE(colourErrorOf(entry.colourErrorP95), 0.97 * p90 - 0.2) << page;
+            EXPECT_LE(colourErrorOf(entry.colourErrorP95), 1.03 * p99 + 0.8) << page;
+            EXPECT_GE(colourErrorOf(entry.colourErrorMax), 0.97 * whole - 0.2) << page;
+            EXPECT_LE(colourErrorOf(entry.colourErrorMax), 1.1 * slabs.back().deltaE + 3) << page;
+        }
+        return compared;
+    }
+
     /// Returns how many levels have at least 20 of the slabs.
     static size_t levelsOf(const std::vector<PlacedSlab>& slabs) {
         std::map<uint32_t, int> count;
@@ -227,6 +275,10 @@ TEST_F(ColourLevels, ACheckerboardKeepsItsLight) {
         EXPECT_NEAR(srgbToLinear(double(slab.colour & 255u) / 255), 0.5, 0.1);
     }
     EXPECT_GT(mixed, 20);
+    EXPECT_GE(compareErrors(shown), 5);
+    EXPECT_EQ(shown.data().header.version, kColourErrorsFileVersion);
+    // Half black and half white, a grey of the mean light is far from either: 58 in the root of the mean square.
+    EXPECT_NEAR(colourErrorOf(shown.data().pages[0].colourErrorP95), 58, 4);
 }
 
 TEST_F(ColourLevels, SurfacesOfAnyColourKeepTheirLight) {
@@ -236,8 +288,20 @@ TEST_F(ColourLevels, SurfacesOfAnyColourKeepTheirLight) {
         PaintedMesh ball{test::sphereMesh({0, 0, 0}, 10, rings), {}};
         for (size_t v = 0; v < ball.mesh.positions.size(); ++v) ball.colours.push_back(uint32_t(random()));
         build(ball, 0.12);
-        EXPECT_GE(levelsOf(compare(Shown(folder_ / "out.vcp", 3))), 3u);
+        const Shown shown(folder_ / "out.vcp", 3);
+        EXPECT_GE(levelsOf(compare(shown)), 3u);
+        EXPECT_GE(compareErrors(shown), 3);
     }
+}
+
+TEST_F(ColourLevels, OneColourIsNowhereOff) {
+    PaintedMesh ball{test::sphereMesh({0, 0, 0}, 10, 40), {}};
+    ball.colours.assign(ball.mesh.positions.size(), 0xff20a0c0u);
+    build(ball, 0.3);
+    const Shown shown(folder_ / "out.vcp", 3);
+    EXPECT_GT(shown.slabs.size(), 100u);
+    // But for the rounding of single precision.
+    for (const PageEntry& page : shown.data().pages) EXPECT_LE(colourErrorOf(page.colourErrorMax), 0.01);
 }
 
 }  // namespace

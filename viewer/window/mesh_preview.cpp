@@ -20,7 +20,6 @@ namespace vcp {
 namespace {
 
 constexpr double kSecondsBetweenLooks = 0.25;
-constexpr uint32_t kWhite = ~0u;
 
 }  // namespace
 
