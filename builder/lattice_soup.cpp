@@ -135,7 +135,7 @@ std::optional<TexturedTriangle> LatticeSnapper::placeOf(const Piece& piece) cons
     const LatticeTriangle& t = piece.triangle;
     if (vertexColours_ && (t.colour[0] & t.colour[1] & t.colour[2]) != kWhite) return {};
     const PlacedMaterial& placed = placed_[piece.material - 1];
-    TexturedTriangle place{{t.corner[0], t.corner[1], t.corner[2]}, {}, placed.number, kUnknownTint};
+    TexturedTriangle place{{t.corner[0], t.corner[1], t.corner[2]}, {}, placed.number};
     for (int axis = 0; axis < 2; ++axis) {
         const double low = std::min({piece.uv[0][axis], piece.uv[1][axis], piece.uv[2][axis]}),
                      high = std::max({piece.uv[0][axis], piece.uv[1][axis], piece.uv[2][axis]});
@@ -149,7 +149,6 @@ std::optional<TexturedTriangle> LatticeSnapper::placeOf(const Piece& piece) cons
             place.point[i][axis] = int32_t(std::floor(steps + 0.5)) * (1 << placed.shift);
         }
     }
-    place.tint = colours_->tintOf(piece.material, piece.uv);
     return place;
 }
 

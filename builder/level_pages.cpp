@@ -52,8 +52,7 @@ Result<BuiltPage> buildPage(const LevelSettings& settings, const LatticeMesh& me
 uint64_t bytesOf(const LatticeMesh& mesh) {
     return mesh.positions.size() * (sizeof(glm::i32vec3) + 2 * sizeof(uint32_t)) +
            mesh.triangles.size() * (sizeof mesh.triangles[0] + sizeof(float)) +
-           mesh.textures.size() * (sizeof mesh.textures[0] + sizeof mesh.tints[0]) +
-           mesh.cornerNormals.size() * sizeof mesh.cornerNormals[0];
+           mesh.textures.size() * sizeof mesh.textures[0] + mesh.cornerNormals.size() * sizeof mesh.cornerNormals[0];
 }
 
 /// Measures of triangles, each counted by itself; in cells.

@@ -27,7 +27,7 @@ constexpr uint64_t kLeastUsable = 96 * kMiB;
 // A bin's records, its mesh, and what the step to the coarser level needs; measured, with some room to spare.
 constexpr uint64_t kBinTriangleBytes = 284;
 // Where a triangle is in an image: its record, and in the mesh.
-constexpr uint64_t kTextureBytes = sizeof(TexturedTriangle) + 3 * sizeof(TexturePoint) + sizeof(Tint);
+constexpr uint64_t kTextureBytes = sizeof(TexturedTriangle) + 3 * sizeof(TexturePoint);
 
 // A page's directory entry, of 80 bytes: in the pages' list and in that of the surfaces, both with the coarser levels
 // and with room to grow, and at the end, alone, in the file's directory.

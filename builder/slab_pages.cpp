@@ -10,13 +10,13 @@ namespace vcp {
 
 namespace {
 
-Result<PageSurface> surfaceAbove(const PageSpool& below, Siblings siblings, uint32_t log2Cells, bool withTints) {
+Result<PageSurface> surfaceAbove(const PageSpool& below, Siblings siblings, uint32_t log2Cells) {
     std::vector<PageSurface> pages;
     std::vector<uint32_t> octants;
     for (size_t i = siblings.first; i < siblings.end; ++i) {
         const PageEntry& entry = below.entries()[i];
         VCP_TRY_ASSIGN(const auto stored, below.read(entry));
-        pages.push_back(surfaceFrom(stored, withTints));
+        pages.push_back(surfaceFrom(stored));
         octants.push_back(uint32_t(entry.morton & 7));
     }
     return foldPages(pages, octants, log2Cells);
@@ -24,8 +24,8 @@ Result<PageSurface> surfaceAbove(const PageSpool& below, Siblings siblings, uint
 
 Result<BuiltPage> buildPage(const LevelSettings& settings, const PageSpool& below, Siblings siblings,
                             bool withSurface) {
-    VCP_TRY_ASSIGN(const auto surface, surfaceAbove(below, siblings, settings.grid.log2Cells, settings.withColour));
-    PageTree tree = buildSlabTree(surface, settings.grid.log2Cells);
+    VCP_TRY_ASSIGN(const auto surface, surfaceAbove(below, siblings, settings.grid.log2Cells));
+    PageTree tree = buildSlabTree(surface, settings.grid.log2Cells, settings.withColour);
     const uint64_t code = below.entries()[siblings.first].morton >> 3;
     VCP_TRY_ASSIGN(auto page, builtPage(settings, code, encodeSlabPage(tree, settings.withColour)));
     page.entry.colourErrorP95 = colourErrorCode(tree.colourError.p95);

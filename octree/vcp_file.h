@@ -152,8 +152,9 @@ static_assert(sizeof(PageEntry) == 80 && offsetof(PageEntry, firstChild) == 56 &
               offsetof(PageEntry, childMask) == 72 && offsetof(PageEntry, colourErrorP95) == 75);
 
 // The colour error of a slab leaf is the root of the mean square, over the mesh's surface in it, of the difference
-// between the slab's colour and those that the finest level shows there, as ΔE: 100 times the distance in OKLab. So it
-// counts all that the slab lacks when it is seen from near; what a pixel is too wide to show is within it.
+// between the slab's colour and the mean light of the surface in each of the leaf's eight octants, as ΔE: 100 times the
+// distance in OKLab. So it counts what pages one level finer show more of. What is finer still is none: where distances
+// choose the level, no slab is wider than about three times the error that is asked for.
 inline constexpr double kMostColourError = 100;
 
 /// Returns the ΔE that a byte of an entry stands for.

@@ -109,7 +109,7 @@ struct PictureTile {
     bool operator==(const PictureTile&) const = default;
 };
 
-inline constexpr double kUsualColourError = 2;
+inline constexpr double kUsualColourError = 6;
 
 /// Returns the colour error that a picture may have: any where it shows no colours.
 inline double colourErrorIn(ShadingMode mode, double asked) {

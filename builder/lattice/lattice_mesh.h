@@ -26,7 +26,6 @@ struct LatticeMesh {
     std::vector<uint32_t> parts;  ///< that vertices belong to, as many as positions; empty: kClosedPart
     /// Where triangles are in images, one a triangle, corner by corner (addTextures); empty where there are none.
     std::vector<std::array<TexturePoint, 3>> textures;
-    std::vector<Tint> tints;  ///< with textures, one a triangle: of the texels on it; kUnknownTint where it has none
     /// The mesh's own normals (packDirection), one a triangle, corner by corner, where they count in place of those of
     /// the vertices; kUnknownNormal where they do not, empty where none do.
     std::vector<std::array<uint32_t, 3>> cornerNormals;

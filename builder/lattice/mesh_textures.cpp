@@ -37,32 +37,25 @@ int compareCorners(const TexturedTriangle& a, const TexturedTriangle& b) {
 bool isLess(const TexturedTriangle& a, const TexturedTriangle& b) {
     if (const int corners = compareCorners(a, b); corners != 0) return corners < 0;
     const auto rest = [](const TexturedTriangle& t) {
-        return std::tie(t.material, t.point[0].x, t.point[0].y, t.point[1].x, t.point[1].y, t.point[2].x, t.point[2].y,
-                        t.tint.mean.x, t.tint.mean.y, t.tint.mean.z, t.tint.spread);
+        return std::tie(t.material, t.point[0].x, t.point[0].y, t.point[1].x, t.point[1].y, t.point[2].x, t.point[2].y);
     };
     return rest(a) < rest(b);
 }
 
-struct KnownTriangle {
-    std::array<TexturePoint, 3> points{};
-    Tint tint = kUnknownTint;
-};
-
 /// Returns what is known of a triangle, or none. `known`: sorted; `corners`: as the mesh has them.
-KnownTriangle found(const std::vector<TexturedTriangle>& known, const glm::i32vec3 (&corners)[3]) {
+std::array<TexturePoint, 3> found(const std::vector<TexturedTriangle>& known, const glm::i32vec3 (&corners)[3]) {
     TexturedTriangle wanted{};
     for (int i = 0; i < 3; ++i) wanted.corner[i] = corners[i];
     sortCorners(wanted);
     const auto at =
         std::lower_bound(known.begin(), known.end(), wanted,
                          [](const TexturedTriangle& a, const TexturedTriangle& b) { return compareCorners(a, b) < 0; });
-    KnownTriangle triangle;
-    if (at == known.end() || compareCorners(*at, wanted) != 0) return triangle;
+    std::array<TexturePoint, 3> points{};
+    if (at == known.end() || compareCorners(*at, wanted) != 0) return points;
     for (size_t i = 0; i < 3; ++i)
         for (int k = 0; k < 3; ++k)
-            if (at->corner[k] == corners[i]) triangle.points[i] = {at->point[k].x, at->point[k].y, at->material};
-    triangle.tint = at->tint;
-    return triangle;
+            if (at->corner[k] == corners[i]) points[i] = {at->point[k].x, at->point[k].y, at->material};
+    return points;
 }
 
 }  // namespace
@@ -74,13 +67,10 @@ void addTextures(LatticeMesh& mesh, std::vector<TexturedTriangle> known) {
     });
     tbb::parallel_sort(known.begin(), known.end(), isLess);
     mesh.textures.resize(mesh.triangles.size());
-    mesh.tints.resize(mesh.triangles.size());
     tbb::parallel_for(tbb::blocked_range<size_t>(0, mesh.triangles.size(), kTriangleGrain), [&](const auto& range) {
         for (size_t k = range.begin(); k < range.end(); ++k) {
             const auto& [a, b, c] = mesh.triangles[k];
-            const KnownTriangle triangle = found(known, {mesh.positions[a], mesh.positions[b], mesh.positions[c]});
-            mesh.textures[k] = triangle.points;
-            mesh.tints[k] = triangle.tint;
+            mesh.textures[k] = found(known, {mesh.positions[a], mesh.positions[b], mesh.positions[c]});
         }
     });
 }

@@ -7,9 +7,9 @@
 
 namespace vcp {
 
-/// Fills mesh.textures and mesh.tints. `known`: in any order, of triangles of the mesh on its deepest lattice, and of
-/// others; of several for one triangle the least counts, so that their order does not matter. A triangle that nothing
-/// is known of gets none. Uses the calling arena's threads.
+/// Fills mesh.textures. `known`: in any order, of triangles of the mesh on its deepest lattice, and of others; of
+/// several for one triangle the least counts, so that their order does not matter. A triangle that nothing is known of
+/// gets none. Uses the calling arena's threads.
 void addTextures(LatticeMesh& mesh, std::vector<TexturedTriangle> known);
 
 }  // namespace vcp

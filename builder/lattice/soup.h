@@ -7,7 +7,6 @@
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 
-#include "builder/stream/colour_difference.h"
 #include "octree/surface/vertex_normal.h"
 
 namespace vcp {
@@ -43,10 +42,9 @@ static_assert(sizeof(LatticeTriangle) == 80);
 /// and finds its triangle by the corners.
 struct TexturedTriangle {
     glm::i32vec3 corner[3];
-    glm::i32vec2 point[3];     ///< of the corners, as TexturePoint (octree/page/page.h) has it
-    uint32_t material;         ///< likewise
-    Tint tint = kUnknownTint;  ///< of the image's texels on it
+    glm::i32vec2 point[3];  ///< of the corners, as TexturePoint (octree/page/page.h) has it
+    uint32_t material;      ///< likewise
 };
-static_assert(sizeof(TexturedTriangle) == 80);
+static_assert(sizeof(TexturedTriangle) == 64);
 
 }  // namespace vcp

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <mutex>
 #include <numbers>
 
@@ -219,7 +218,6 @@ std::vector<T> joined(const std::vector<std::vector<T>>& blocks) {
 
 /// The difference of colours at a hit.
 struct ColourSample {
-    uint64_t page;
     float deltaE;
     bool isOfSlab;
 };
@@ -227,31 +225,18 @@ struct ColourSample {
 /// `cut`: the pages that are measured.
 SlabColours slabColoursOf(const Dataset& dataset, std::span<const uint64_t> cut,
                           std::span<const ColourSample> samples) {
-    struct Sum {
-        double squares = 0;
-        uint64_t count = 0;
-        void add(double squared) { squares += squared, ++count; }
-        [[nodiscard]] double rms() const { return count > 0 ? std::sqrt(squares / double(count)) : 0; }
-    };
     SlabColours colours;
     for (const uint64_t page : cut) {
         colours.p95 = std::max(colours.p95, colourErrorOf(dataset.pages[page].colourErrorP95));
         colours.max = std::max(colours.max, colourErrorOf(dataset.pages[page].colourErrorMax));
     }
-    Sum all;
-    std::map<uint64_t, Sum> byPage;
+    double squares = 0;
     for (const ColourSample& sample : samples) {
         if (!sample.isOfSlab) continue;
-        const double squared = double(sample.deltaE) * double(sample.deltaE);
-        all.add(squared), byPage[sample.page].add(squared);
+        squares += double(sample.deltaE) * double(sample.deltaE);
+        ++colours.samples;
     }
-    colours.samples = all.count;
-    colours.rms = all.rms();
-    for (const auto& [page, sum] : byPage) {
-        if (sum.count < kLeastColourSamples) continue;
-        ++colours.pages;
-        colours.pagesBeyond += sum.rms() > colourErrorOf(dataset.pages[page].colourErrorMax) ? 1 : 0;
-    }
+    if (colours.samples > 0) colours.rms = std::sqrt(squares / double(colours.samples));
     return colours;
 }
 
@@ -319,7 +304,7 @@ Result<SurfaceDistance> measureSurfaceDistance(const PageCache& cache, const Mes
                 if (normal != glm::dvec3(0)) degrees[i / kBlock].push_back(float(lineDegrees(hit.normal, normal)));
                 if (options.paint == nullptr) continue;
                 if (const auto difference = differenceAt(cache, hit, options, mesh.mesh(), nearest))
-                    colours[i / kBlock].push_back({hit.page, float(*difference), nodeType(hit.node) == kNodeSlab});
+                    colours[i / kBlock].push_back({float(*difference), nodeType(hit.node) == kNodeSlab});
             }
         }))
         return cancelled;

@@ -36,15 +36,12 @@ struct SurfaceDistanceOptions {
     std::function<bool(double)> progress;
 };
 
-/// How far off the colours of slab leaves are, as ΔE, beside what their pages say (colourErrorOf).
+/// How far the colours of slab leaves are from the mesh's, as ΔE, beside what their pages say (colourErrorOf).
 struct SlabColours {
     uint64_t samples = 0;
-    double rms = 0;            ///< of all samples
-    double p95 = 0, max = 0;   ///< the largest that pages say of theirs
-    uint64_t pages = 0;        ///< pages with at least kLeastColourSamples samples
-    uint64_t pagesBeyond = 0;  ///< of these, whose samples have a larger root of the mean square than they say
+    double rms = 0;           ///< root of the mean square, with what is finer than their octants
+    double p95 = 0, max = 0;  ///< the largest that pages say of theirs
 };
-inline constexpr uint64_t kLeastColourSamples = 100;
 
 struct SurfaceDistance {
     Quantiles meshToSurface;       ///< world units

@@ -7,18 +7,6 @@
 
 namespace vcp {
 
-namespace {
-
-/// Returns the tint of a run of cells, by their areas.
-Tint meanTint(const SurfaceCells& cells, size_t first, size_t end) {
-    TintMean mean;
-    for (size_t i = first; i < end; ++i)
-        if (cells.tints[i] != kUnknownTint) mean.add(cells.tints[i], double(cells.cells[i].area));
-    return mean.mean();
-}
-
-}  // namespace
-
 SurfaceCells foldCells(const SurfaceCells& eighths) {
     SurfaceCells folded;
     std::vector<uint32_t> octants;
@@ -30,7 +18,6 @@ SurfaceCells foldCells(const SurfaceCells& eighths) {
             octants.push_back(eighths.codes[end] & 7u);
         folded.codes.push_back(code);
         folded.cells.push_back(foldEighths(std::span(eighths.cells).subspan(i, end - i), octants));
-        if (!eighths.tints.empty()) folded.tints.push_back(meanTint(eighths, i, end));
         i = end;
     }
     return folded;
@@ -87,7 +74,6 @@ void append(SurfaceCells& to, const SurfaceCells& from, uint32_t octant, uint32_
     to.codes.reserve(to.size() + from.size());
     for (const uint32_t code : from.codes) to.codes.push_back(octant << 3 * depth | code);
     to.cells.insert(to.cells.end(), from.cells.begin(), from.cells.end());
-    to.tints.insert(to.tints.end(), from.tints.begin(), from.tints.end());
 }
 
 }  // namespace
@@ -103,25 +89,20 @@ PageSurface foldPages(std::span<const PageSurface> pages, std::span<const uint32
 }
 
 std::vector<std::byte> bytesOf(const SurfaceCells& cells) {
-    std::vector<std::byte> bytes;
-    const auto append = [&bytes](const auto& values) {
-        const auto all = std::as_bytes(std::span(values));
-        bytes.insert(bytes.end(), all.begin(), all.end());
-    };
-    append(cells.codes), append(cells.cells), append(cells.tints);
+    const size_t codes = cells.size() * sizeof(uint32_t), all = cells.size() * sizeof(CellSurface);
+    std::vector<std::byte> bytes(codes + all);
+    if (bytes.empty()) return bytes;
+    std::memcpy(bytes.data(), cells.codes.data(), codes);
+    std::memcpy(bytes.data() + codes, cells.cells.data(), all);
     return bytes;
 }
 
-SurfaceCells surfaceCellsFrom(std::span<const std::byte> bytes, bool withTints) {
-    const size_t count = bytes.size() / (sizeof(uint32_t) + sizeof(CellSurface) + (withTints ? sizeof(Tint) : 0));
-    SurfaceCells cells{std::vector<uint32_t>(count), std::vector<CellSurface>(count),
-                       std::vector<Tint>(withTints ? count : 0)};
-    const auto take = [&bytes](auto& values) {
-        const auto to = std::as_writable_bytes(std::span(values));
-        if (!to.empty()) std::memcpy(to.data(), bytes.data(), to.size());
-        bytes = bytes.subspan(to.size());
-    };
-    take(cells.codes), take(cells.cells), take(cells.tints);
+SurfaceCells surfaceCellsFrom(std::span<const std::byte> bytes) {
+    const size_t count = bytes.size() / (sizeof(uint32_t) + sizeof(CellSurface));
+    SurfaceCells cells{std::vector<uint32_t>(count), std::vector<CellSurface>(count)};
+    if (count == 0) return cells;
+    std::memcpy(cells.codes.data(), bytes.data(), count * sizeof(uint32_t));
+    std::memcpy(cells.cells.data(), bytes.data() + count * sizeof(uint32_t), count * sizeof(CellSurface));
     return cells;
 }
 
@@ -129,9 +110,8 @@ StoredPage storedSurface(const PageSurface& surface) {
     return {.geometry = bytesOf(surface.cells), .colour = bytesOf(surface.halves)};
 }
 
-PageSurface surfaceFrom(const StoredPage& stored, bool withTints) {
-    return {.cells = surfaceCellsFrom(stored.geometry, withTints),
-            .halves = surfaceCellsFrom(stored.colour, withTints)};
+PageSurface surfaceFrom(const StoredPage& stored) {
+    return {.cells = surfaceCellsFrom(stored.geometry), .halves = surfaceCellsFrom(stored.colour)};
 }
 
 }  // namespace vcp

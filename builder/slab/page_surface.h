@@ -9,7 +9,6 @@
 
 #include "builder/lattice/lattice_mesh.h"
 #include "builder/slab/cell_surface.h"
-#include "builder/stream/colour_difference.h"
 #include "octree/vcp_writer.h"
 
 namespace vcp {
@@ -18,7 +17,6 @@ namespace vcp {
 struct SurfaceCells {
     std::vector<uint32_t> codes;  ///< Morton codes within the page, ascending
     std::vector<CellSurface> cells;
-    std::vector<Tint> tints;  ///< as many as cells where the mesh has colour, or none
 
     [[nodiscard]] size_t size() const { return codes.size(); }
 };
@@ -43,14 +41,14 @@ PageSurface foldPages(std::span<const PageSurface> pages, std::span<const uint32
 /// Returns the coarser cells that hold these.
 SurfaceCells foldCells(const SurfaceCells& eighths);
 
-/// Returns cells as bytes, and the cells in such bytes. `withTints`: whether they have tints.
+/// Returns cells as bytes, and the cells in such bytes.
 std::vector<std::byte> bytesOf(const SurfaceCells& cells);
-SurfaceCells surfaceCellsFrom(std::span<const std::byte> bytes, bool withTints);
+SurfaceCells surfaceCellsFrom(std::span<const std::byte> bytes);
 
 /// Returns a page's surface as it is stored on temporary files, cells as `geometry` and halves as `colour`, and the
 /// surface in what was stored; quarters are left out.
 StoredPage storedSurface(const PageSurface& surface);
-PageSurface surfaceFrom(const StoredPage& stored, bool withTints);
+PageSurface surfaceFrom(const StoredPage& stored);
 
 /// Returns the bytes that surfaceOf needs for triangles with so large areas and perimeters together, in cells: a piece
 /// for each half cell that a triangle touches, and the cells themselves where the pieces come in parts.

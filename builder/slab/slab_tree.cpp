@@ -4,7 +4,10 @@
 #include <array>
 #include <cmath>
 
+#include <glm/geometric.hpp>
+
 #include "builder/slab/slab_error.h"
+#include "builder/stream/colour_difference.h"
 #include "octree/surface/morton.h"
 #include "octree/surface/packing.h"
 
@@ -14,8 +17,8 @@ namespace {
 
 class SlabTreeBuilder {
 public:
-    SlabTreeBuilder(const PageSurface& surface, uint32_t log2Cells)
-        : levels_{&surface.cells, &surface.halves, &surface.quarters}, log2Cells_(log2Cells) {
+    SlabTreeBuilder(const PageSurface& surface, uint32_t log2Cells, bool withColour)
+        : levels_{&surface.cells, &surface.halves, &surface.quarters}, log2Cells_(log2Cells), withColour_(withColour) {
         tree_.cells = 1 << log2Cells;
         tree_.occupied.assign(size_t{1} << 3 * log2Cells, 0);
     }
@@ -74,13 +77,23 @@ private:
 
     void makeSlab(uint32_t node, const SlabLeaf& leaf, size_t level, size_t index) {
         tree_.makeSlab(node, leaf);
-        const SurfaceCells& cells = *levels_[level];
-        if (cells.tints.empty()) return;
-        const double area = std::ldexp(double(cells.cells[index].area), -2 * int(level));
-        differences_.push_back({rmsDifference(cells.tints[index], leaf.colour), area});
+        if (!withColour_) return;
+        const glm::dvec3 shown = okLabOfStored(leaf.colour);
+        double squares = 0, area = 0;
+        const Run eighths = eighthsOf(level, index);
+        for (size_t i = eighths.first; i < eighths.end; ++i) {
+            const CellSurface& eighth = levels_[level + 1]->cells[i];
+            if (!(eighth.area > 0)) continue;
+            const double part = double(eighth.area);
+            const glm::dvec3 off = okLabOf(glm::dvec3(eighth.light) / part) - shown;
+            squares += part * glm::dot(off, off);
+            area += part;
+        }
+        // Areas are in squares of an eighth's edge.
+        if (area > 0) differences_.push_back({100 * std::sqrt(squares / area), std::ldexp(area, -2 * int(level))});
     }
 
-    /// A slab's colour error, and the area of the surface in it, in squares of the page's cells.
+    /// A slab's colour error, and the area of the surface in it.
     struct Difference {
         double deltaE, area;
     };
@@ -127,6 +140,7 @@ private:
 
     std::array<const SurfaceCells*, 3> levels_;  ///< cells, halves, quarters
     uint32_t log2Cells_;
+    bool withColour_;
     PageTree tree_;
     std::vector<Difference> differences_;
     std::vector<uint32_t> octants_;
@@ -135,8 +149,8 @@ private:
 
 }  // namespace
 
-PageTree buildSlabTree(const PageSurface& surface, uint32_t log2Cells) {
-    return SlabTreeBuilder(surface, log2Cells).run();
+PageTree buildSlabTree(const PageSurface& surface, uint32_t log2Cells, bool withColour) {
+    return SlabTreeBuilder(surface, log2Cells, withColour).run();
 }
 
 }  // namespace vcp

@@ -16,6 +16,7 @@ inline constexpr double kMostSlabError = 0.45;
 
 /// Builds a page's octree from its surface. Leaves are cells, or halves of them where a whole one would not do.
 /// Precondition: each cell has halves, and each half quarters, as foldPages makes them.
-PageTree buildSlabTree(const PageSurface& surface, uint32_t log2Cells);
+/// `withColour`: finds the colour error, too.
+PageTree buildSlabTree(const PageSurface& surface, uint32_t log2Cells, bool withColour = false);
 
 }  // namespace vcp

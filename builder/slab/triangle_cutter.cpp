@@ -61,41 +61,25 @@ glm::dvec4 lightOfColour(const glm::dvec4& stored) {
 // Pictures blend stored colours over a triangle and take their light. A fan is summed up by the middles of its
 // triangles' edges, which is exact for quadratics: of light that goes from black to white within a piece, it errs by a
 // few hundredths.
-template <class Visit>
-void TriangleCutter::forEachMiddles(const Polygon& piece, const Visit& visit) const {
+glm::vec4 TriangleCutter::lightOf(const Polygon& piece) const {
+    if (mesh_.colours.empty()) return glm::vec4(1);
+    if (source_.isPlain) return glm::vec4(lightOfColour(source_.colour[0]));
     const auto storedAt = [&](const glm::dvec3& p) {
         const glm::dvec3 w = source_.weightsAt(p);
         return w.x * source_.colour[0] + w.y * source_.colour[1] + w.z * source_.colour[2];
     };
     const glm::dvec4 first = storedAt(piece[0]);
-    glm::dvec4 before = storedAt(piece[1]);
+    glm::dvec4 before = storedAt(piece[1]), sum(0);
+    double area = 0;
     for (size_t i = 2; i < piece.size(); ++i) {
         const glm::dvec4 after = storedAt(piece[i]);
         const double share = glm::length(glm::cross(piece[i - 1] - piece[0], piece[i] - piece[0]));
-        visit(std::array{(first + before) / 2.0, (before + after) / 2.0, (after + first) / 2.0}, share);
+        sum += share * (lightOfColour((first + before) / 2.0) + lightOfColour((before + after) / 2.0) +
+                        lightOfColour((after + first) / 2.0));
+        area += share;
         before = after;
     }
-}
-
-glm::vec4 TriangleCutter::lightOf(const Polygon& piece) const {
-    if (mesh_.colours.empty()) return glm::vec4(1);
-    if (source_.isPlain) return glm::vec4(lightOfColour(source_.colour[0]));
-    glm::dvec4 sum(0);
-    double area = 0;
-    forEachMiddles(piece, [&](const std::array<glm::dvec4, 3>& middles, double share) {
-        sum += share * (lightOfColour(middles[0]) + lightOfColour(middles[1]) + lightOfColour(middles[2]));
-        area += share;
-    });
     return glm::vec4(sum / (3 * area));
-}
-
-Tint TriangleCutter::tintOf(const Polygon& piece) const {
-    if (source_.tint != kUnknownTint) return source_.tint;
-    TintMean mean;
-    forEachMiddles(piece, [&](const std::array<glm::dvec4, 3>& middles, double share) {
-        for (const glm::dvec4& stored : middles) mean.add(okLabOf(glm::dvec3(lightOfColour(stored))), share);
-    });
-    return mean.mean();
 }
 
 TriangleCutter::Source TriangleCutter::sourceOf(uint32_t triangle) const {
@@ -115,8 +99,6 @@ TriangleCutter::Source TriangleCutter::sourceOf(uint32_t triangle) const {
     for (size_t i = 0; i < 3; ++i)
         for (int k = 0; k < 4; ++k) source.colour[i][k] = double(mesh_.colours[t[i]] >> 8 * k & 255u) / 255;
     source.isPlain = mesh_.colours[t[0]] == mesh_.colours[t[1]] && mesh_.colours[t[0]] == mesh_.colours[t[2]];
-    if (!mesh_.tints.empty()) source.tint = mesh_.tints[triangle];
-    if (source.tint == kUnknownTint && source.isPlain) source.tint = {glm::vec3(okLabOfStored(mesh_.colours[t[0]])), 0};
     return source;
 }
 
@@ -246,7 +228,6 @@ void TriangleCutter::keep(const Polygon& piece, glm::ivec3 cell) {
     kept.area = float(size / 2);
     kept.normal = glm::vec3(length > 0 ? normal / length : n[0]);
     kept.light = lightOf(piece);
-    if (!mesh_.colours.empty()) tints_.push_back(tintOf(piece));
     kept.parts = source_.parts;
     const glm::dvec3 centre = glm::dvec3(cell) + 0.5;
     for (const glm::dvec3& p : piece) corners_.emplace_back(p - centre);
@@ -284,14 +265,6 @@ CellSurface TriangleCutter::sum(std::span<const uint64_t> pieces) const {
     return cell;
 }
 
-Tint TriangleCutter::tintOf(std::span<const uint64_t> pieces) const {
-    TintMean mean;
-    for (const uint64_t number : pieces)
-        if (const Tint& tint = tints_[uint32_t(number)]; tint != kUnknownTint)
-            mean.add(tint, double(pieces_[uint32_t(number)].area));
-    return mean.mean();
-}
-
 void TriangleCutter::appendTo(SurfaceCells& cells) const {
     // Cells in order, and in each the pieces as they were cut.
     std::vector<uint64_t> order(pieces_.size());
@@ -303,7 +276,6 @@ void TriangleCutter::appendTo(SurfaceCells& cells) const {
         while (end < order.size() && uint32_t(order[end] >> 32) == code) ++end;
         cells.codes.push_back(code);
         cells.cells.push_back(sum(std::span(order).subspan(i, end - i)));
-        if (!tints_.empty()) cells.tints.push_back(tintOf(std::span(order).subspan(i, end - i)));
         i = end;
     }
 }

@@ -45,7 +45,6 @@ private:
         std::array<glm::dvec3, 3> normal;
         std::array<glm::dvec4, 3> colour;  ///< as stored, 0 to 1, where the mesh has colours
         bool isPlain = true;               ///< all of it has the first corner's colour
-        Tint tint = kUnknownTint;          ///< of all of it, where it is plain or an image says so
         uint32_t parts = 0;                ///< the kind of part that it belongs to, as PageEntry's
         /// Returns the weights of the corners at a point of the triangle.
         [[nodiscard]] glm::dvec3 weightsAt(glm::dvec3 p) const;
@@ -86,15 +85,8 @@ private:
     void keep(const Polygon& piece, glm::ivec3 cell);
     /// Returns the mean light of a piece of the triangle that is being cut, and its mean alpha.
     [[nodiscard]] glm::vec4 lightOf(const Polygon& piece) const;
-    /// Returns the piece's tint; the mesh has colours.
-    [[nodiscard]] Tint tintOf(const Polygon& piece) const;
-    /// Calls visit(stored colours at the middles of the edges of a part of the piece, the part's share) for the parts.
-    template <class Visit>
-    void forEachMiddles(const Polygon& piece, const Visit& visit) const;
     /// `pieces`: their numbers in the low halves of words.
     [[nodiscard]] CellSurface sum(std::span<const uint64_t> pieces) const;
-    /// Returns the tint of the surface in a cell.
-    [[nodiscard]] Tint tintOf(std::span<const uint64_t> pieces) const;
 
     static constexpr int kMostWalls = 6;
     static constexpr size_t kMostParts = 27;  // with two walls along each axis
@@ -106,7 +98,6 @@ private:
     Source source_;
     std::array<Polygon, 2 * kMostParts> room_;  ///< for the parts of a piece
     std::vector<CellPiece> pieces_;
-    std::vector<Tint> tints_;         ///< of the pieces, where the mesh has colours
     std::vector<glm::vec3> corners_;  ///< from the centres of the pieces' cells
 };
 

@@ -1,6 +1,5 @@
 #include "builder/stream/colour_difference.h"
 
-#include <algorithm>
 #include <cmath>
 
 #include <glm/geometric.hpp>
@@ -25,31 +24,6 @@ glm::dvec3 okLabOfStored(Rgba8 colour) {
 
 double colourDifference(glm::dvec3 light, glm::dvec3 other) {
     return 100 * glm::distance(okLabOf(light), okLabOf(other));
-}
-
-void TintMean::add(const Tint& tint, double weight) {
-    const glm::dvec3 mean(tint.mean);
-    weight_ += weight;
-    sum_ += weight * mean;
-    squares_ += weight * (double(tint.spread) + glm::dot(mean, mean));
-}
-
-void TintMean::add(glm::dvec3 okLab, double weight) {
-    weight_ += weight;
-    sum_ += weight * okLab;
-    squares_ += weight * glm::dot(okLab, okLab);
-}
-
-Tint TintMean::mean() const {
-    if (!(weight_ > 0)) return kUnknownTint;
-    const glm::dvec3 mean = sum_ / weight_;
-    return {glm::vec3(mean), float(std::max(0.0, squares_ / weight_ - glm::dot(mean, mean)))};
-}
-
-double rmsDifference(const Tint& tint, Rgba8 colour) {
-    if (tint.spread < 0) return 0;
-    const glm::dvec3 off = okLabOfStored(colour) - glm::dvec3(tint.mean);
-    return 100 * std::sqrt(double(tint.spread) + glm::dot(off, off));
 }
 
 }  // namespace vcp

@@ -9,7 +9,6 @@
 
 #include <glm/vec2.hpp>
 
-#include "builder/stream/colour_difference.h"
 #include "builder/stream/material.h"
 #include "builder/texture/texture.h"
 
@@ -26,9 +25,6 @@ public:
     /// Returns what `material` (numbered from 1; 0: white) gives the corners of a triangle with these texture
     /// coordinates (placeOfCorner).
     std::array<Rgba8, 3> ofCorners(uint32_t material, const glm::vec2 (&uv)[3]);
-    /// Returns the tint of such a triangle: of the finest texels at up to 64 places that are spread over it evenly, by
-    /// their alpha.
-    Tint tintOf(uint32_t material, const glm::vec2 (&uv)[3]);
     /// Images that could not be read, one line each.
     [[nodiscard]] std::span<const std::string> warnings() const { return textures_.warnings(); }
 

@@ -143,13 +143,6 @@ Rgba8 Texture::sample(glm::vec2 uv, const TextureFootprint& footprint) const {
     return encodedTexel(sum);
 }
 
-Rgba8 Texture::texelAt(glm::vec2 uv) const {
-    const Image& finest = levels_[0];
-    const double x = std::floor(double(uv.x) * finest.width), y = std::floor(double(uv.y) * finest.height);
-    return finest
-        .texels[size_t{wrappedTexel(y, finest.height, wrapV_)} * finest.width + wrappedTexel(x, finest.width, wrapU_)];
-}
-
 const Texture* TextureCache::textureOf(std::span<const Material> materials, uint32_t number) {
     if (number >= materials.size() || !materials[number].image.exists() || broken_.contains(number)) return nullptr;
     if (const auto found = byMaterial_.find(number); found != byMaterial_.end()) {

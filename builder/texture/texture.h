@@ -57,9 +57,6 @@ public:
     /// same units. Any thread.
     [[nodiscard]] Rgba8 sample(glm::vec2 uv, const TextureFootprint& footprint) const;
 
-    /// Returns the finest texel at `uv`, which is as sample() has it. Any thread.
-    [[nodiscard]] Rgba8 texelAt(glm::vec2 uv) const;
-
     [[nodiscard]] glm::uvec2 size() const { return {levels_[0].width, levels_[0].height}; }
     [[nodiscard]] uint64_t bytes() const;
     /// The mip chain, the finest level that is kept first, down to a single texel.

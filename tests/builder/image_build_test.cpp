@@ -45,36 +45,6 @@ protected:
     TestFolder folder_{"vcp_image_build"};
 };
 
-// Half of the texels are black, half white: from their mean light, a grey, they are 58 off in the root of the mean
-// square, and never less than 50 from any colour.
-TEST_F(ImageBuild, ColourErrorsCountTexels) {
-    const auto write = [&](bool isNoise) {
-        const auto texel = [=](uint32_t x, uint32_t y) {
-            return !isNoise || (x * 2654435761u ^ y * 2246822519u) * 3266489917u >> 31 != 0 ? 0xffffffu : 0u;
-        };
-        TexturedWalls::write(folder_.path(), texel, texel, false);
-    };
-    const auto errorsOfRoot = [&](bool keepImages) {
-        BuildOptions o = options();
-        o.keepImages = keepImages;
-        EXPECT_FALSE(built(o).empty());
-        const auto dataset = readDataset(**openFile(output()));
-        EXPECT_TRUE(dataset.ok());
-        return std::pair(colourErrorOf(dataset->pages[0].colourErrorP95),
-                         colourErrorOf(dataset->pages[0].colourErrorMax));
-    };
-    write(true);
-    const auto [p95, max] = errorsOfRoot(true);
-    EXPECT_GE(p95, 50);
-    EXPECT_LE(p95, 68);
-    EXPECT_GE(max, p95);
-    // Without images the file has the colours of vertices alone, each a mean of many texels.
-    EXPECT_LT(errorsOfRoot(false).first, 40);
-    write(false);
-    // What is white throughout is off where it meets the wall without an image alone.
-    EXPECT_LT(errorsOfRoot(true).first, 5);
-}
-
 TEST_F(ImageBuild, KeepsImagesAndWhereTheyLie) {
     BuildOptions o = options();
     o.imageQuality = {.finest = 0, .coarser = 0};

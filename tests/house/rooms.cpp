@@ -19,7 +19,7 @@ const std::vector<Room>& rooms() {
         {"builder/mesh/gltf", {"octree/", "builder/stream"}},
         {"builder/mesh", {"octree/", "builder/stream", "builder/mesh/gltf"}},
         {"builder/spill", {"octree/"}},
-        {"builder/lattice", {"octree/", "builder/stream"}},
+        {"builder/lattice", {"octree/"}},
         {"builder/page", {"octree/", "builder/lattice"}},
         {"builder/slab", {"octree/", "builder/stream", "builder/lattice", "builder/page"}},
         {"builder/level", {"octree/", "builder/stream", "builder/lattice", "builder/spill"}},

@@ -122,9 +122,10 @@ void addDistances(Json& json, const SurfaceDistance& distance) {
     json["normal_degrees"] = toJson(distance.normalDegrees);
     if (distance.colourSamples > 0) json["colour_delta_e"] = toJson(distance.colourDifference);
     if (const SlabColours& slabs = distance.slabColours; slabs.max > 0)
-        json["slab_colours"] = {{"samples", slabs.samples},      {"rms", slabs.rms},
-                                {"colour_error_p95", slabs.p95}, {"colour_error_max", slabs.max},
-                                {"subvolumes", slabs.pages},     {"subvolumes_beyond", slabs.pagesBeyond}};
+        json["slab_colours"] = {{"samples", slabs.samples},
+                                {"rms", slabs.rms},
+                                {"colour_error_p95", slabs.p95},
+                                {"colour_error_max", slabs.max}};
     json["cell"] = distance.cell;
     json["certified_error_max"] = distance.certifiedErrorMax;
     json["samples"] = distance.samples;
@@ -151,9 +152,8 @@ std::string distanceTable(const SurfaceDistance& distance) {
                             colour.p95, colour.p99, colour.max);
     }
     if (const SlabColours& slabs = distance.slabColours; slabs.max > 0)
-        text += fmt::format("  {:<16} {:.2f} of slabs; said of 95 %: {:.2f}, of all: {:.2f}; beyond that: {} of {}\n",
-                            "  root mean square", slabs.rms, slabs.p95, slabs.max, slabs.pagesBeyond,
-                            formatCount(slabs.pages, "subvolume"));
+        text += fmt::format("  {:<16} {:>11.2f}; pages say {:.2f} of 95 %, {:.2f} of all\n", "  of slabs, rms",
+                            slabs.rms, slabs.p95, slabs.max);
     text += fmt::format("  {:<16} {:>47}\n  {:<16} {:>47.5f}", "certified", formatLength(distance.certifiedErrorMax),
                         "  in cells", distance.certifiedErrorMax / distance.cell);
     return text;

@@ -337,7 +337,7 @@ typedef struct vcp_look {
      * were closed, as it is where a file does not say which parts are */
     uint32_t section_caps;
     /* ΔE, 100 for black and white: where slabs' colours differ by more from what they stand for, detail is read until
-     * they are no larger than error_pixels; 0: 2; 100: colours do not count */
+     * they are no larger than error_pixels; 0: 6; 100: colours do not count */
     double colour_error;
     uint32_t plain; /* 1: plain light, also where materials have normals, roughness, metalness or emission */
     uint32_t reserved;

@@ -20,6 +20,7 @@ namespace vcp {
 namespace {
 
 constexpr double kSecondsBetweenLooks = 0.25;
+constexpr uint32_t kWhite = ~0u;
 
 }  // namespace
 

@@ -271,10 +271,10 @@ TEST(Slabs, APageCutPartByPartIsTheSame) {
 TEST(Slabs, SurfacesComeBackFromTheirBytes) {
     const FoldedPages pages = pagesOf(scenes()[0].mesh);
     const SurfaceCells& cells = pages.above.cells;
-    const SurfaceCells again = surfaceCellsFrom(bytesOf(cells), false);
+    const SurfaceCells again = surfaceCellsFrom(bytesOf(cells));
     EXPECT_EQ(again.codes, cells.codes);
     EXPECT_EQ(bytesOf(again), bytesOf(cells));
-    EXPECT_EQ(surfaceCellsFrom({}, false).size(), 0u);
+    EXPECT_EQ(surfaceCellsFrom({}).size(), 0u);
 }
 
 }  // namespace
