@@ -149,7 +149,7 @@ Result<BuiltPage> builtPage(const LevelSettings& settings, uint64_t code, const 
     page.entry.morton = code;
     page.entry.level = uint8_t(settings.grid.level);
     page.entry.leaves = encoded.leaves;
-    page.entry.slabLeaves = encoded.slabLeaves;
+    page.entry.slabLeaves = encoded.slabLeaves & 0xffffffu;
     page.entry.hardLeaves = encoded.hardLeaves;
     page.entry.parts = encoded.parts;
     page.entry.certifiedError =

@@ -28,10 +28,12 @@ Result<PageSurface> surfaceAbove(const PageSpool& below, Siblings siblings, uint
 Result<BuiltPage> buildPage(const LevelSettings& settings, const PageSpool& below, Siblings siblings,
                             bool withSurface) {
     VCP_TRY_ASSIGN(auto surface, surfaceAbove(below, siblings, settings.grid.log2Cells));
-    PageTree tree = buildSlabTree(surface, settings.grid.log2Cells);
+    PageTree tree = buildSlabTree(surface, settings.grid.log2Cells, settings.withColour);
     surface.quarters = {};
     const uint64_t code = below.entries()[siblings.first].morton >> 3;
     VCP_TRY_ASSIGN(auto page, builtPage(settings, code, encodeSlabPage(tree, settings.withColour)));
+    page.entry.colourErrorP95 = colourErrorCode(tree.colourError.p95);
+    page.entry.colourErrorMax = colourErrorCode(tree.colourError.max);
     if (withSurface) page.surface = storedSurface(surface);
     return page;
 }

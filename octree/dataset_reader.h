@@ -20,6 +20,7 @@ struct Dataset {
     [[nodiscard]] bool hasColour() const { return (header.flags & kFlagColour) != 0; }
     [[nodiscard]] bool isCovering() const { return (header.flags & kFlagCovering) != 0; }
     [[nodiscard]] bool hasImages() const { return (header.flags & kFlagImages) != 0; }
+    [[nodiscard]] bool hasColourErrors() const { return (header.flags & kFlagColourErrors) != 0; }
     [[nodiscard]] bool hasParts() const { return (header.flags & kFlagParts) != 0; }
     /// Whether some of the mesh's parts are known to be open.
     [[nodiscard]] bool hasOpenParts() const { return header.closedParts < header.parts; }

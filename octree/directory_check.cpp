@@ -15,6 +15,8 @@ namespace {
 // A page is built from at most a few 10^5 leaves; anything above this is a lie.
 constexpr uint64_t kMaxPageBytes = uint64_t{1} << 28;
 
+constexpr uint64_t kSlabLeavesOffset = 76;  ///< three bytes, and one of the colour error
+
 uint8_t mostPartsOf(uint32_t flags) {
     const uint8_t both = kPageHasClosed | kPageHasOpen;
     return (flags & kFlagParts) == 0 ? uint8_t{0} : (flags & kFlagMarks) == 0 ? both : uint8_t(both | kPageHasMarks);
@@ -46,13 +48,16 @@ Result<void> EntryCheck::check(uint64_t index, const PageEntry& e, uint32_t leve
     if (e.hardLeaves > e.leaves)
         return fail(offsetof(PageEntry, hardLeaves), "leaf counts: more hard leaves than leaves");
     if (e.slabLeaves > e.leaves - e.hardLeaves || (e.slabLeaves != 0 && header_.version == 3))
-        return fail(offsetof(PageEntry, slabLeaves), "leaf counts: more slab leaves than leaves");
+        return fail(kSlabLeavesOffset, "leaf counts: more slab leaves than leaves");
     // The root's word stands in the page's header, the words of all other leaves among the nodes.
     if (e.leaves > e.pageBytes / sizeof(uint32_t))
         return fail(offsetof(PageEntry, leaves), "leaf counts: more leaves than its page has room for");
     if (e.childMask == 0 && e.firstChild != 0)
         return fail(offsetof(PageEntry, firstChild), "wrong child pages: a first one where there are none");
-    if (e.reserved != 0) return fail(offsetof(PageEntry, reserved), "reserved bytes must be zero");
+    if (e.colourErrorP95 > e.colourErrorMax)
+        return fail(offsetof(PageEntry, colourErrorP95), "colour error: of 95 % more than of all");
+    if (e.colourErrorMax != 0 && (e.slabLeaves == 0 || (header_.flags & kFlagColourErrors) == 0))
+        return fail(kSlabLeavesOffset + 3, "a colour error where no slab can have one");
     const bool isMarked = e.parts > (kPageHasClosed | kPageHasOpen);
     if (e.parts > mostParts_ || (isMarked && e.parts != mostParts_))
         return fail(offsetof(PageEntry, parts), "kinds of parts out of range");

@@ -1,7 +1,7 @@
-// The .vcp file, version 6; 7 where pages have open marks, 8 where there are images, and 9 where materials have further
-// channels. Files of versions 3 to 5 are
-// read, too: they say nothing of parts; those of versions 3 and 4 have all pages without children on the finest level;
-// those of version 3 have no slab leaves and no kFlagCovering.
+// The .vcp file, version 6; 7 where pages have open marks, 8 where there are images, 9 where materials have further
+// channels, and 10 where pages say how far off the colours of their slabs are. Files of versions 3 to 5 are read, too:
+// they say nothing of parts; those of versions 3 and 4 have all pages without children on the finest level; those of
+// version 3 have no slab leaves and no kFlagCovering.
 //
 // Pages without children hold the finest surface. Most are of the finest level; where triangles are few, they are of
 // coarser ones.
@@ -34,11 +34,12 @@
 namespace vcp {
 
 inline constexpr uint32_t kFileVersion = 6;
-inline constexpr uint32_t kMarkedFileVersion = 7;                          ///< with kFlagMarks
-inline constexpr uint32_t kImagesFileVersion = 8;                          ///< with kFlagImages
-inline constexpr uint32_t kChannelsFileVersion = 9;                        ///< with kFlagChannels
-inline constexpr uint32_t kOldestFileVersion = 3, kNewestFileVersion = 9;  ///< that are read
-inline constexpr uint32_t kMaxLevels = 22;                                 ///< Morton codes have 21 bits an axis
+inline constexpr uint32_t kMarkedFileVersion = 7;                           ///< with kFlagMarks
+inline constexpr uint32_t kImagesFileVersion = 8;                           ///< with kFlagImages
+inline constexpr uint32_t kChannelsFileVersion = 9;                         ///< with kFlagChannels
+inline constexpr uint32_t kColourErrorsFileVersion = 10;                    ///< with kFlagColourErrors
+inline constexpr uint32_t kOldestFileVersion = 3, kNewestFileVersion = 10;  ///< that are read
+inline constexpr uint32_t kMaxLevels = 22;                                  ///< Morton codes have 21 bits an axis
 inline constexpr uint32_t kMaxPaperLog2Cells = 20;
 inline constexpr uint64_t kDirectoryOffset = 4096;
 inline constexpr uint64_t kBlockBytes = 4096;
@@ -79,7 +80,7 @@ struct FileHeader {
     uint32_t levels = 0;  ///< 1 to kMaxLevels
     uint32_t log2Cells =
         0;               ///< cells an edge of a page: 2^log2Cells; 1 to 7, of the method Paper to kMaxPaperLog2Cells
-    uint32_t flags = 0;  ///< kFlagColour, kFlagCovering, kFlagParts, kFlagMarks, kFlagImages, kFlagChannels
+    uint32_t flags = 0;  ///< kFlagColour, kFlagCovering, kFlagParts and the others below
     Method method = Method::Certified;
     uint64_t triangles = 0, degenerateTriangles = 0, vertices = 0;
     uint64_t leaves = 0;      ///< soft, slab and hard leaves of the pages without children
@@ -108,6 +109,9 @@ inline constexpr uint32_t kFlagImages = 16;
 
 /// With kFlagImages: some materials have further channels (octree/image/image_tables.h).
 inline constexpr uint32_t kFlagChannels = 32;
+
+/// With kFlagColour: entries of pages with slab leaves say how far off their colours are.
+inline constexpr uint32_t kFlagColourErrors = 64;
 
 /// What PageEntry::parts is made of. kPageHasMarks: with both others only; marks tell which surface is whose.
 inline constexpr uint8_t kPageHasClosed = 1, kPageHasOpen = 2, kPageHasMarks = 4;
@@ -140,11 +144,27 @@ struct PageEntry {
     uint8_t childMask = 0;     ///< octants that have a page on the next level
     uint8_t level = 0;
     uint8_t parts = 0;  ///< with kFlagParts: the kinds of parts in it, kPageHasClosed, kPageHasOpen, kPageHasMarks
-    uint8_t reserved = 0;
-    uint32_t slabLeaves = 0;
+    uint8_t colourErrorP95 = 0;       ///< with kFlagColourErrors: 95 % of the slabs' surface err by no more (below)
+    uint32_t slabLeaves : 24 = 0;     ///< a page numbers their vectors with 20 bits
+    uint32_t colourErrorMax : 8 = 0;  ///< likewise: of the slab that errs most; 0: no slab, or not known
 };
 static_assert(sizeof(PageEntry) == 80 && offsetof(PageEntry, firstChild) == 56 &&
-              offsetof(PageEntry, childMask) == 72 && offsetof(PageEntry, slabLeaves) == 76);
+              offsetof(PageEntry, childMask) == 72 && offsetof(PageEntry, colourErrorP95) == 75);
+
+// The colour error of a slab leaf is the root of the mean square, over the mesh's surface in it, of the difference
+// between the slab's colour and the mean light of the surface in each of the leaf's eight octants, as ΔE: 100 times the
+// distance in OKLab. So it counts what pages one level finer show more of. What is finer still is none: where distances
+// choose the level, no slab is wider than about three times the error that is asked for.
+inline constexpr double kMostColourError = 100;
+
+/// Returns the ΔE that a byte of an entry stands for.
+constexpr double colourErrorOf(uint32_t code) { return kMostColourError * double(code * code) / (255 * 255); }
+/// Returns the byte of the least ΔE that is at least this one; 255 where there is none.
+constexpr uint8_t colourErrorCode(double deltaE) {
+    uint32_t code = 0;
+    while (code < 255 && colourErrorOf(code) < deltaE) ++code;
+    return uint8_t(code);
+}
 
 /// What the header says of the pages without children.
 struct FinestFigures {

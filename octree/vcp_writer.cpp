@@ -106,6 +106,10 @@ Result<uint64_t> VcpWriter::commit(FileHeader header) {
         header.version = kChannelsFileVersion;
         header.flags |= kFlagChannels;
     }
+    if (std::ranges::any_of(entries_, [](const PageEntry& e) { return e.colourErrorMax != 0; })) {
+        header.version = kColourErrorsFileVersion;
+        header.flags |= kFlagColourErrors;
+    }
     header.pages = pages_;
     header.fileBytes = end_ + sizeof(CommitRecord);
     header.hash = 0;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <vector>
 
@@ -108,6 +109,15 @@ struct PictureTile {
     bool operator==(const PictureTile&) const = default;
 };
 
+inline constexpr double kUsualColourError = 6;
+
+/// Returns the colour error that a picture may have: any where it shows no colours.
+inline double colourErrorIn(ShadingMode mode, double asked) {
+    const bool isColourless =
+        mode == ShadingMode::Clay || mode == ShadingMode::Normals || mode == ShadingMode::Wireframe;
+    return isColourless ? std::numeric_limits<double>::infinity() : asked;
+}
+
 /// How one dataset is shown.
 struct DatasetLook {
     uint32_t dataset = 0;             ///< its number
@@ -126,6 +136,8 @@ struct FrameRequest {
     std::optional<PictureTile> tile;      ///< absent: the picture is the whole
     uint32_t sample = 0;                  ///< where in its pixel each ray goes (pixel_samples.h): 0: the middle
     double errorPixels = 0.5;             ///< a page is refined where its certified error projects to more
+    /// ΔE (colourErrorOf): a page whose slabs are farther off is refined where these project to more than errorPixels.
+    double colourError = kUsualColourError;
     Shading shading;
     std::vector<SectionPlane> sections;     ///< at most kMostSections
     Caps sectionCaps = Caps::None;          ///< without sections there are none

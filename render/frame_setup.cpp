@@ -300,6 +300,7 @@ SelectionView selectionView(const FrameRequest& request) {
     view.orthographic = request.camera.projection == Projection::Orthographic;
     view.pixelsPerUnit = whole.fullHeight / (2 * basis.halfHeight);
     view.errorPixels = request.errorPixels;
+    view.colourError = request.colourError;
     view.pixels = double(request.width) * request.height;
     view.rays = numberOfRays(request);
     // The picture's edges are tangents, or world units where the projection is orthographic.
@@ -328,6 +329,7 @@ Result<void> checkRequest(const FrameRequest& request) {
         return usage("a tile must lie within its picture, and that be at most 2^20 pixels wide and high");
     if (request.sample >= kMostSamples) return usage("a pixel has at most 64 samples");
     if (!(request.errorPixels >= 0)) return usage("the tolerated error in pixels must not be negative");
+    if (!(request.colourError >= 0)) return usage("the tolerated colour error must not be negative");
     const auto finite = [](glm::dvec3 v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); };
     if (!finite(camera.eye) || !finite(camera.forward) || !finite(camera.up))
         return usage("the camera has coordinates that are not numbers");

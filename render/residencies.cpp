@@ -23,6 +23,7 @@ void add(UpdateResult& all, const UpdateResult& one) {
     all.awaitsRays = all.awaitsRays || one.awaitsRays;
     all.relaxed = all.relaxed || one.relaxed;
     all.errorPixels = std::max(all.errorPixels, one.errorPixels);
+    all.colourPixels = std::max(all.colourPixels, one.colourPixels);
     all.pagesInCut += one.pagesInCut;
     all.pagesWanted += one.pagesWanted;
     all.pagesMissing += one.pagesMissing;

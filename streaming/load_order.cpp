@@ -87,7 +87,7 @@ void LoadPriorities::hear(const RayFeedback& feedback, const SelectionView& view
         const double distance = view.orthographic ? 1 : glm::length(corner + glm::dvec3(hit.place) * unit - view.eye);
         const auto errorOf = [&](uint64_t page) {
             if (pageUnits_[page] == 0) return 0.0;
-            return double(dataset_->pages[page].certifiedError) * view.pixelsPerUnit / std::max(distance, unit);
+            return refinedError(*dataset_, dataset_->pages[page], view) * view.pixelsPerUnit / std::max(distance, unit);
         };
         std::optional<uint64_t> page = hit.page;
         while (page && errorOf(*page) > view.errorPixels && dataset_->pages[*page].childMask != 0) {

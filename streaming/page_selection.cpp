@@ -31,19 +31,41 @@ struct Candidate {
 
 }  // namespace
 
-double projectedError(const Dataset& dataset, const PageEntry& page, const SelectionView& view) {
-    if (page.certifiedError <= 0) return 0;
-    const double error = double(page.certifiedError) * view.pixelsPerUnit;
-    if (view.orthographic) return error;
+bool isColourOff(const PageEntry& page, const SelectionView& view) {
+    return page.colourErrorP95 != 0 && colourErrorOf(page.colourErrorP95) > view.colourError;
+}
+
+double refinedError(const Dataset& dataset, const PageEntry& page, const SelectionView& view) {
+    const double certified = double(page.certifiedError);
+    return isColourOff(page, view) ? std::max(certified, dataset.cellOf(page.level)) : certified;
+}
+
+namespace {
+
+/// Returns a length in pixels, at the point of a page's box nearest to the eye; infinite where the eye is inside of it.
+double projected(double length, const Dataset& dataset, const PageEntry& page, const SelectionView& view) {
+    if (length <= 0) return 0;
+    const double wide = length * view.pixelsPerUnit;
+    if (view.orthographic) return wide;
     const glm::dvec3 lo = dataset.originOf(page), hi = lo + dataset.edgeOf(page);
     const double distance = glm::length(glm::clamp(view.eye, lo, hi) - view.eye);
-    return distance > 0 ? error / distance : kInfinity;
+    return distance > 0 ? wide / distance : kInfinity;
+}
+
+/// Returns the same, seen from no nearer than a cell.
+double shown(double length, const Dataset& dataset, const PageEntry& page, const SelectionView& view) {
+    const double wide = projected(length, dataset, page, view);
+    return view.orthographic ? wide : std::min(wide, length * view.pixelsPerUnit / dataset.cellOf(page.level));
+}
+
+}  // namespace
+
+double projectedError(const Dataset& dataset, const PageEntry& page, const SelectionView& view) {
+    return projected(refinedError(dataset, page, view), dataset, page, view);
 }
 
 double shownError(const Dataset& dataset, const PageEntry& page, const SelectionView& view) {
-    const double error = projectedError(dataset, page, view);
-    if (view.orthographic) return error;
-    return std::min(error, double(page.certifiedError) * view.pixelsPerUnit / dataset.cellOf(page.level));
+    return shown(double(page.certifiedError), dataset, page, view);
 }
 
 bool inFrustum(const Dataset& dataset, const PageEntry& page, const SelectionView& view) {
@@ -313,8 +335,11 @@ private:
         drawable_.cut.push_back(page);
         drawable_.pagesUnseen += uint64_t(std::popcount(unseen));
         if (canBePartial(dataset_, entry) && (there != 0 || unseen != 0)) drawable_.partial.push_back({page, own});
-        if (error > 0 && (unseen == 0 || unseen != own))
-            drawable_.errorPixels = std::max(drawable_.errorPixels, shownError(dataset_, entry, view_));
+        if (error <= 0 || (unseen != 0 && unseen == own)) return;
+        drawable_.errorPixels = std::max(drawable_.errorPixels, shownError(dataset_, entry, view_));
+        if (isColourOff(entry, view_))
+            drawable_.colourPixels =
+                std::max(drawable_.colourPixels, shown(dataset_.cellOf(entry.level), dataset_, entry, view_));
     }
 
     const Dataset& dataset_;

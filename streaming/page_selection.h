@@ -2,7 +2,9 @@
 // clock, no GPU; the same input gives the same output.
 //
 // A page is refined, that is replaced by all its children, where its certified error projects to more than
-// errorPixels at the point of its box nearest to the eye. The largest projected error goes first, while the
+// errorPixels at the point of its box nearest to the eye. Where the colours of its slabs are farther off than
+// colourError, it counts as if it erred by a whole slab: what is wrong with them cannot be seen where a slab is no
+// larger than the error that may be. The largest projected error goes first, while the
 // children fit into the budget; so a budget too small for the view relaxes the error evenly over the
 // picture. Where the directory has come in part (octree/vcp_file.h), a page whose children are not known yet counts as
 // missing them. Pages outside of the view's frustum are not refined. A refined page stays wanted beneath its
@@ -24,6 +26,7 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -46,7 +49,8 @@ struct SelectionView {
     /// Inward planes of the frustum: a point x is outside of a plane where dot(xyz, x - eye) + w < 0.
     std::array<glm::dvec4, 4> planes{};
     double errorPixels = 0.5;
-    double pixels = 0;  ///< of the picture
+    double colourError = std::numeric_limits<double>::infinity();  ///< ΔE, as colourErrorOf() has it
+    double pixels = 0;                                             ///< of the picture
     uint64_t rays = 0;  ///< any number that differs where other rays are cast from the same place
 
     bool operator==(const SelectionView&) const = default;
@@ -108,8 +112,9 @@ struct PartialPage {
 struct DrawableCut {
     std::vector<uint64_t> cut;         ///< what can be drawn now, in directory order; empty without the root
     std::vector<PartialPage> partial;  ///< those of the cut that are not drawn whole, in directory order
-    double errorPixels = 0;  ///< largest projected error of pages in view but those that no ray hit, seen from no
-                             ///< nearer than a cell; infinite without a cut
+    double errorPixels = 0;   ///< largest projected certified error of pages in view but those that no ray hit, seen
+                              ///< from no nearer than a cell; infinite without a cut
+    double colourPixels = 0;  ///< edge of the widest slabs whose colours are off, likewise
     uint64_t pagesWanted = 0, pagesMissing = 0;  ///< pages of the choice that this view needs; of these, not resident
     uint64_t pagesUnseen = 0;  ///< pages that this view would need if rays hit their parents, which are drawn there
     bool complete = false;     ///< no page is missing; also where nothing can be drawn
@@ -127,11 +132,18 @@ Selection selectPages(const Dataset& dataset, const SelectionView& view, uint64_
                       std::span<const uint64_t> pageBytes, std::span<const uint8_t> resident,
                       std::span<const uint8_t> states);
 
-/// Returns the certified error of a page in pixels, at the point of its box nearest to the eye; infinite where the eye
-/// is inside of the box.
+/// Whether the colours of a page's slabs are farther off than the view allows, for more than 5 % of them.
+bool isColourOff(const PageEntry& page, const SelectionView& view);
+
+/// Returns the error of a page for which it is refined, world units: its certified one or, where its colours are off,
+/// the edge of a slab.
+double refinedError(const Dataset& dataset, const PageEntry& page, const SelectionView& view);
+
+/// Returns the same in pixels, at the point of its box nearest to the eye; infinite where the eye is inside of the box.
 double projectedError(const Dataset& dataset, const PageEntry& page, const SelectionView& view);
 
-/// Returns the same, seen from no nearer than a cell: inside of the box the error has no bound.
+/// Returns the certified error of a page in pixels, seen from no nearer than a cell: inside of the box the error has no
+/// bound.
 double shownError(const Dataset& dataset, const PageEntry& page, const SelectionView& view);
 
 /// Whether a page's box touches the view's frustum (no false negatives).

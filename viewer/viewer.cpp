@@ -63,6 +63,12 @@ std::string formatPixels(double pixels) {
     return pixels < 10 ? fmt::format("{:.2g}", pixels) : fmt::format("{:.0f}", pixels);
 }
 
+/// Says what errs most in a picture, and by how many pixels.
+static std::string errorText(const UpdateResult& update) {
+    const bool isOfColour = detailLimitOf(update) == DetailLimit::Colour;
+    return fmt::format("{} {} px", isOfColour ? "colour" : "error", formatPixels(refinedPixels(update)));
+}
+
 std::string statusLine(const ViewerStatus& status, size_t most) {
     const std::string device = status.device + (status.software ? " (software)" : "");
     if (status.name.empty()) return device.substr(0, most);
@@ -74,8 +80,7 @@ std::string statusLine(const ViewerStatus& status, size_t most) {
         const std::string levels =
             coarsest == finest ? fmt::format("level {}", finest) : fmt::format("levels {} to {}", coarsest, finest);
         parts.push_back(fmt::format("{} (finest {})", levels, status.levels - 1));
-        if (coarsest + 1 < status.levels)
-            parts.push_back(fmt::format("error {} px", formatPixels(status.update.errorPixels)));
+        if (coarsest + 1 < status.levels) parts.push_back(errorText(status.update));
     }
     if (status.reduction > 1) parts.push_back(fmt::format("1/{} size", status.reduction));
     parts.push_back(fmt::format("{:.0f} ms", status.frame.msFrame));
@@ -131,7 +136,7 @@ void Viewer::show(const std::vector<PlacedDataset>& datasets, const MesoScene& s
     dataset_ = datasets.empty() ? nullptr : datasets.front().dataset;
     isOpen_ = hasBounds_ = true;
     isPaper_ = !datasets.empty() && surfaces.surfaces.empty();
-    hasChannels_ = false;
+    hasChannels_ = hasColourErrors_ = false;
     bounds_ = surfaces.bounds;
     status_.triangles = status_.levels = 0;
     for (const PlacedDataset& each : datasets) {
@@ -141,6 +146,7 @@ void Viewer::show(const std::vector<PlacedDataset>& datasets, const MesoScene& s
                                            each.placement));
         isPaper_ = isPaper_ && header.method == Method::Paper;
         hasChannels_ = hasChannels_ || (header.flags & kFlagChannels) != 0;
+        hasColourErrors_ = hasColourErrors_ || (header.flags & kFlagColourErrors) != 0;
         status_.triangles += header.triangles;
         status_.levels = std::max(status_.levels, header.levels);
     }
@@ -498,6 +504,7 @@ FrameRequest Viewer::requestWith(int reduction) const {
     request.height = uint32_t(std::max(1, size_.y / reduction));
     request.errorPixels = options_.errorPixels;
     request.shading = shading_;
+    request.colourError = colourErrorIn(shading_.mode, options_.colourError);
     if (request.shading.environment) request.shading.environment->up = directionOf(camera_.up);
     // The first pictures of a scene come without, as moving ones do, so that there is something to look at.
     const bool isFirst = options_.framesAhead && isOpen_ && !hasSettled_;

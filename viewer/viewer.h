@@ -67,6 +67,7 @@ enum class ViewerAction {
 struct ViewerOptions {
     RendererOptions renderer;
     double errorPixels = 0.5;
+    double colourError = kUsualColourError;  ///< ΔE
     Shading shading;
     std::vector<SectionPlane> sections;
     Caps sectionCaps = Caps::None;
@@ -196,6 +197,8 @@ public:
     [[nodiscard]] const std::shared_ptr<const Dataset>& dataset() const { return dataset_; }
     /// Whether some dataset's materials have channels (Shading::channels).
     [[nodiscard]] bool hasChannels() const { return hasChannels_; }
+    /// Whether some dataset's pages say how far off their colours are.
+    [[nodiscard]] bool hasColourErrors() const { return hasColourErrors_; }
     /// Returns why an action shows nothing on what is open; empty where it shows something.
     [[nodiscard]] std::string whyWithout(ViewerAction action) const;
     [[nodiscard]] glm::ivec2 size() const { return size_; }
@@ -230,6 +233,8 @@ public:
     [[nodiscard]] SectionGrab sectionGrab() const;
     [[nodiscard]] double errorPixels() const { return options_.errorPixels; }
     void setErrorPixels(double pixels) { options_.errorPixels = pixels; }
+    [[nodiscard]] double colourError() const { return options_.colourError; }
+    void setColourError(double deltaE) { options_.colourError = deltaE; }
     [[nodiscard]] uint32_t samples() const { return options_.samples; }
     /// Samples that the picture of now comes to: one, where it shows numbers.
     [[nodiscard]] uint32_t mostSamples() const;
@@ -286,7 +291,7 @@ private:
     bool isOpen_ = false;
     bool hasBounds_ = false;  // of what is open or foreseen: the camera may be moved
     bool isPaper_ = false;    // all datasets are of the method `paper`
-    bool hasChannels_ = false;
+    bool hasChannels_ = false, hasColourErrors_ = false;
     Box bounds_;
     OrbitCamera camera_, home_;
     Shading shading_;

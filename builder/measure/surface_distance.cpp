@@ -8,9 +8,9 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
-#include "builder/measure/colour_difference.h"
 #include "builder/measure/hit_colour.h"
 #include "builder/measure/mesh_samples.h"
+#include "builder/stream/colour_difference.h"
 
 namespace vcp {
 
@@ -209,10 +209,35 @@ std::optional<double> differenceAt(const PageCache& cache, const RayHit& hit, co
 }
 
 /// Joins what blocks of samples found, in their order.
-std::vector<float> joined(const std::vector<std::vector<float>>& blocks) {
-    std::vector<float> all;
+template <class T>
+std::vector<T> joined(const std::vector<std::vector<T>>& blocks) {
+    std::vector<T> all;
     for (const auto& block : blocks) all.insert(all.end(), block.begin(), block.end());
     return all;
+}
+
+/// The difference of colours at a hit.
+struct ColourSample {
+    float deltaE;
+    bool isOfSlab;
+};
+
+/// `cut`: the pages that are measured.
+SlabColours slabColoursOf(const Dataset& dataset, std::span<const uint64_t> cut,
+                          std::span<const ColourSample> samples) {
+    SlabColours colours;
+    for (const uint64_t page : cut) {
+        colours.p95 = std::max(colours.p95, colourErrorOf(dataset.pages[page].colourErrorP95));
+        colours.max = std::max(colours.max, colourErrorOf(dataset.pages[page].colourErrorMax));
+    }
+    double squares = 0;
+    for (const ColourSample& sample : samples) {
+        if (!sample.isOfSlab) continue;
+        squares += double(sample.deltaE) * double(sample.deltaE);
+        ++colours.samples;
+    }
+    if (colours.samples > 0) colours.rms = std::sqrt(squares / double(colours.samples));
+    return colours;
 }
 
 /// Keeps the largest distance that threads report; ties go to the lowest sample.
@@ -262,8 +287,8 @@ Result<SurfaceDistance> measureSurfaceDistance(const PageCache& cache, const Mes
         return cancelled;
 
     const std::vector<LeafBox> leaves = leavesOfLevel.list();
-    std::vector<std::vector<float>> toMesh((options.samples + kBlock - 1) / kBlock), degrees(toMesh.size()),
-        colours(toMesh.size());
+    std::vector<std::vector<float>> toMesh((options.samples + kBlock - 1) / kBlock), degrees(toMesh.size());
+    std::vector<std::vector<ColourSample>> colours(toMesh.size());
     Worst worstOfSurface;
     if (!leaves.empty() && !runner.run(options.samples, 0.6, 1, [&](uint64_t i) {
             SampleRandom random(options.seed, 2 * i + 1);
@@ -279,18 +304,21 @@ Result<SurfaceDistance> measureSurfaceDistance(const PageCache& cache, const Mes
                 if (normal != glm::dvec3(0)) degrees[i / kBlock].push_back(float(lineDegrees(hit.normal, normal)));
                 if (options.paint == nullptr) continue;
                 if (const auto difference = differenceAt(cache, hit, options, mesh.mesh(), nearest))
-                    colours[i / kBlock].push_back(float(*difference));
+                    colours[i / kBlock].push_back({float(*difference), nodeType(hit.node) == kNodeSlab});
             }
         }))
         return cancelled;
 
-    std::vector<float> allToMesh = joined(toMesh), allColours = joined(colours);
+    std::vector<float> allToMesh = joined(toMesh), differences;
+    const std::vector<ColourSample> allColours = joined(colours);
+    for (const ColourSample& sample : allColours) differences.push_back(sample.deltaE);
     result.samples = toSurface.size() + allToMesh.size();
     result.meshToSurface = quantilesOf(std::move(toSurface));
     result.surfaceToMesh = quantilesOf(std::move(allToMesh));
     result.normalDegrees = quantilesOf(joined(degrees));
     result.colourSamples = allColours.size();
-    result.colourDifference = quantilesOf(std::move(allColours));
+    result.colourDifference = quantilesOf(std::move(differences));
+    result.slabColours = slabColoursOf(dataset, cut, allColours);
     result.worstOfMesh = worstOfMesh.position;
     result.worstOfSurface = worstOfSurface.position;
     return result;

@@ -36,12 +36,20 @@ struct SurfaceDistanceOptions {
     std::function<bool(double)> progress;
 };
 
+/// How far the colours of slab leaves are from the mesh's, as ΔE, beside what their pages say (colourErrorOf).
+struct SlabColours {
+    uint64_t samples = 0;
+    double rms = 0;           ///< root of the mean square, with what is finer than their octants
+    double p95 = 0, max = 0;  ///< the largest that pages say of theirs
+};
+
 struct SurfaceDistance {
     Quantiles meshToSurface;       ///< world units
     Quantiles surfaceToMesh;       ///< world units
     Quantiles normalDegrees;       ///< between the surface's normals and the mesh's, 0 to 90
     Quantiles colourDifference;    ///< of the surface and the mesh; zeros where either has no colour
     uint64_t colourSamples = 0;    ///< hits whose colours were compared
+    SlabColours slabColours;       ///< of those on slab leaves
     glm::dvec3 worstOfMesh{0};     ///< the sample with the largest distance to the surface
     glm::dvec3 worstOfSurface{0};  ///< the hit with the largest distance to the mesh
     uint64_t samples = 0;          ///< samples measured, both ways together

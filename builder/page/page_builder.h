@@ -55,6 +55,12 @@ struct SlabLeaf {
     uint32_t colour = 0xffffffffu;  ///< RGBA8
 };
 
+/// How far off the colours of slabs are, as ΔE (octree/vcp_file.h).
+struct ColourError {
+    double p95 = 0;  ///< of the slabs, by the surface in them
+    double max = 0;
+};
+
 /// The octree of a page, before it is encoded. Node 0 is the root.
 struct PageTree {
     std::vector<TreeNode> nodes;
@@ -67,6 +73,7 @@ struct PageTree {
     double stray = 0;                     ///< the largest of the triangles that touch the page, in cells
     std::vector<uint8_t> occupied;        ///< cells that the mesh touches, x fastest
     bool listsAreCertain = false;         ///< as PageDraft's
+    ColourError colourError;              ///< of the slabs
     /// Makes node `index` an inner one, with eight empty children; returns the first one's number.
     uint32_t addChildren(uint32_t index);
     /// Makes node `index` a hard leaf. `locals`: local numbers, ascending.

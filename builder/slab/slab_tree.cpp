@@ -2,8 +2,12 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+
+#include <glm/geometric.hpp>
 
 #include "builder/slab/slab_error.h"
+#include "builder/stream/colour_difference.h"
 #include "octree/surface/morton.h"
 #include "octree/surface/packing.h"
 
@@ -13,8 +17,8 @@ namespace {
 
 class SlabTreeBuilder {
 public:
-    SlabTreeBuilder(const PageSurface& surface, uint32_t log2Cells)
-        : levels_{&surface.cells, &surface.halves, &surface.quarters}, log2Cells_(log2Cells) {
+    SlabTreeBuilder(const PageSurface& surface, uint32_t log2Cells, bool withColour)
+        : levels_{&surface.cells, &surface.halves, &surface.quarters}, log2Cells_(log2Cells), withColour_(withColour) {
         tree_.cells = 1 << log2Cells;
         tree_.occupied.assign(size_t{1} << 3 * log2Cells, 0);
     }
@@ -28,6 +32,7 @@ public:
             const glm::ivec3 at(mortonDecode(code));
             tree_.occupied[size_t(at.x + tree_.cells * (at.y + tree_.cells * at.z))] = 1;
         }
+        tree_.colourError = colourError();
         return std::move(tree_);
     }
 
@@ -64,10 +69,44 @@ private:
         const Run eighths = eighthsOf(level, index);
         SlabLeaf leaf = leafOf(tree_.nodes[node].box, level, index, eighths);
         // Halves of cells are never parted: their error is small enough whatever lies in them.
-        if (level > 0 || isGood(leaf, index, eighths)) return tree_.makeSlab(node, leaf);
+        if (level > 0 || isGood(leaf, index, eighths)) return makeSlab(node, leaf, level, index);
         const uint32_t children = tree_.addChildren(node);
         for (size_t i = eighths.first; i < eighths.end; ++i)
             buildCell(children + (levels_[level + 1]->codes[i] & 7u), level + 1, i);
+    }
+
+    void makeSlab(uint32_t node, const SlabLeaf& leaf, size_t level, size_t index) {
+        tree_.makeSlab(node, leaf);
+        if (!withColour_) return;
+        const glm::dvec3 shown = okLabOfStored(leaf.colour);
+        double squares = 0, area = 0;
+        const Run eighths = eighthsOf(level, index);
+        for (size_t i = eighths.first; i < eighths.end; ++i) {
+            const CellSurface& eighth = levels_[level + 1]->cells[i];
+            if (!(eighth.area > 0)) continue;
+            const double part = double(eighth.area);
+            const glm::dvec3 off = okLabOf(glm::dvec3(eighth.light) / part) - shown;
+            squares += part * glm::dot(off, off);
+            area += part;
+        }
+        // Areas are in squares of an eighth's edge.
+        if (area > 0) differences_.push_back({100 * std::sqrt(squares / area), std::ldexp(area, -2 * int(level))});
+    }
+
+    /// A slab's colour error, and the area of the surface in it.
+    struct Difference {
+        double deltaE, area;
+    };
+
+    [[nodiscard]] ColourError colourError() {
+        if (differences_.empty()) return {};
+        std::sort(differences_.begin(), differences_.end(),
+                  [](const Difference& a, const Difference& b) { return a.deltaE < b.deltaE; });
+        double all = 0, below = 0;
+        for (const Difference& each : differences_) all += each.area;
+        size_t at = 0;
+        while (at + 1 < differences_.size() && (below += differences_[at].area) < 0.95 * all) ++at;
+        return {.p95 = differences_[at].deltaE, .max = differences_.back().deltaE};
     }
 
     /// Whether a cell needs no finer leaves. Sets the leaf's error.
@@ -101,15 +140,17 @@ private:
 
     std::array<const SurfaceCells*, 3> levels_;  ///< cells, halves, quarters
     uint32_t log2Cells_;
+    bool withColour_;
     PageTree tree_;
+    std::vector<Difference> differences_;
     std::vector<uint32_t> octants_;
     std::vector<SurfaceQuarter> quarters_;
 };
 
 }  // namespace
 
-PageTree buildSlabTree(const PageSurface& surface, uint32_t log2Cells) {
-    return SlabTreeBuilder(surface, log2Cells).run();
+PageTree buildSlabTree(const PageSurface& surface, uint32_t log2Cells, bool withColour) {
+    return SlabTreeBuilder(surface, log2Cells, withColour).run();
 }
 
 }  // namespace vcp

@@ -15,7 +15,8 @@ inline constexpr double kMostNormalSpread = 0.03;
 inline constexpr double kMostSlabError = 0.45;
 
 /// Builds a page's octree from its surface. Leaves are cells, or halves of them where a whole one would not do.
-/// Precondition: each cell has halves, and each half quarters, as PageFold makes them.
-PageTree buildSlabTree(const PageSurface& surface, uint32_t log2Cells);
+/// Precondition: each cell has halves, and each half quarters, as PageFold makes them. `withColour`: finds the colour
+/// error, too.
+PageTree buildSlabTree(const PageSurface& surface, uint32_t log2Cells, bool withColour = false);
 
 }  // namespace vcp

@@ -46,6 +46,7 @@ UpdateResult Residency::report(const DrawableCut& drawable, const ViewCut& drawn
     result.relaxed = drawable.isRelaxed;
     const bool isCertified = dataset().header.method == Method::Certified;
     result.errorPixels = isCertified ? drawable.errorPixels : std::numeric_limits<double>::infinity();
+    result.colourPixels = drawable.colourPixels;
     result.pagesInCut = uint32_t(cut.size());
     result.pagesWanted = uint32_t(drawable.pagesWanted);
     result.pagesMissing = uint32_t(drawable.pagesMissing);

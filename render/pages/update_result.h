@@ -1,6 +1,7 @@
 // What an update of the pages that a view draws came to.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <vector>
@@ -16,6 +17,7 @@ struct UpdateResult {
                               ///< hit others that are too coarse
     bool drawable = false;    ///< at least the coarsest page is there
     double errorPixels = 0;   ///< largest projected certified error in the cut (inf without a page or certificate)
+    double colourPixels = 0;  ///< edge of the widest slabs in the cut whose colours are farther off than allowed
     uint64_t residentBytes = 0;  ///< geometry and colour pages in the pool
     uint64_t bytesRead = 0;      ///< decompressed page bytes the loader has delivered since open()
     bool relaxed = false;  ///< the budget is too small for the view's pixel error, which errorPixels reaches, or the
@@ -42,12 +44,23 @@ enum class Detail {
     Budget,   ///< the budget
 };
 
+/// What errs most in a picture, and so decides what is refined next: distances, or colours.
+enum class DetailLimit { Geometry, Colour };
+inline DetailLimit detailLimitOf(const UpdateResult& update) {
+    return update.colourPixels > update.errorPixels ? DetailLimit::Colour : DetailLimit::Geometry;
+}
+inline const char* nameOf(DetailLimit limit) { return limit == DetailLimit::Colour ? "colour" : "geometry"; }
+
+/// Returns the error for which pages are refined, in pixels: of distances, or the edge of slabs whose colours are off.
+inline double refinedPixels(const UpdateResult& update) { return std::max(update.errorPixels, update.colourPixels); }
+
 /// `askedPixels`: the error that the view may have.
 inline Detail detailOf(const UpdateResult& update, double askedPixels) {
     if (!update.settled) return Detail::Loading;
     if (update.relaxed) return Detail::Budget;
     // Without a certificate, and without a page, the error is infinite.
-    return std::isfinite(update.errorPixels) && update.errorPixels > askedPixels ? Detail::Finest : Detail::Settled;
+    const double error = refinedPixels(update);
+    return std::isfinite(error) && error > askedPixels ? Detail::Finest : Detail::Settled;
 }
 
 /// Returns "loading", "settled", "finest" or "budget": for programs.

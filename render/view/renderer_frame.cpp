@@ -656,7 +656,7 @@ void Renderer::View::keep(const RayFeedback& heard, const SelectionView& view, c
     for (const RayFeedback::Hit& hit : heard.hits) {
         const double distance = view.orthographic ? 1 : glm::length(corner + glm::dvec3(hit.place) * unit - view.eye);
         const double error =
-            double(dataset.pages[hit.page].certifiedError) * view.pixelsPerUnit / std::max(distance, unit);
+            refinedError(dataset, dataset.pages[hit.page], view) * view.pixelsPerUnit / std::max(distance, unit);
         float& kept = feedbackPicture->errorPixels[hit.ray];
         kept = std::max(kept, float(error));
     }

@@ -128,7 +128,7 @@ private:
         const PageEntry& first = whole_.pages[split_.firstPages[shard]];
         FileHeader header = whole_.header;
         header.version = kFileVersion;
-        header.flags &= ~(kFlagMarks | kFlagImages | kFlagChannels);
+        header.flags &= ~(kFlagMarks | kFlagImages | kFlagChannels | kFlagColourErrors);
         header.images = {};
         header.levels = entries.back().level + 1u;
         header.cell = whole_.cellOf(first.level + header.levels - 1);

@@ -14,6 +14,7 @@
 #include <glm/vec4.hpp>
 
 #include "builder/build.h"
+#include "builder/stream/colour_difference.h"
 #include "builder/stream/colour_encoding.h"
 #include "octree/page/page_draft.h"
 #include "octree/page_reader.h"
@@ -49,6 +50,7 @@ struct PlacedSlab {
     Box box;
     uint32_t level;
     uint32_t colour;
+    uint64_t page = 0;
 };
 
 /// What there is to see in a file: the triangles of the finest level in small parts, and all slabs.
@@ -73,7 +75,9 @@ public:
             if (entry.childMask == 0) {
                 addTriangles(*view, box, cell);
             } else {
+                const size_t first = slabs.size();
                 addSlabs(*view, view->header.root, box, entry.level);
+                for (size_t k = first; k < slabs.size(); ++k) slabs[k].page = i;
             }
         }
     }
@@ -97,6 +101,8 @@ public:
             }
         return in;
     }
+
+    [[nodiscard]] const Dataset& data() const { return data_; }
 
     std::vector<Part> parts;
     std::vector<PlacedSlab> slabs;
@@ -202,6 +208,60 @@ protected:
         return compared;
     }
 
+    struct Difference {
+        double deltaE, area;
+    };
+    /// Returns how far a slab's colour is from the mean light in its eighths, and the area in it.
+    static Difference differenceOf(const Shown& shown, const PlacedSlab& slab, const std::vector<size_t>& parts) {
+        std::map<std::array<double, 3>, std::pair<glm::dvec3, double>> eighths;
+        for (const size_t number : parts) {
+            const Part& part = shown.parts[number];
+            const glm::dvec3 at = glm::floor(part.at / (slab.box.edge / 2));
+            auto& [light, area] = eighths[{at.x, at.y, at.z}];
+            light += part.area * glm::dvec3(part.light);
+            area += part.area;
+        }
+        glm::dvec3 light;
+        for (int k = 0; k < 3; ++k) light[k] = srgbToLinear(double(slab.colour >> 8 * k & 255u) / 255);
+        double squares = 0, all = 0;
+        for (const auto& [at, sum] : eighths) {
+            squares += sum.second * std::pow(colourDifference(sum.first / sum.second, light), 2);
+            all += sum.second;
+        }
+        return {all > 0 ? std::sqrt(squares / all) : 0, all};
+    }
+
+    /// Compares the colour errors of pages with what follows from the finest surface in their slabs. Returns how many
+    /// pages it compared.
+    static int compareErrors(const Shown& shown) {
+        std::map<uint64_t, std::vector<Difference>> byPage;
+        const auto inSlabs = shown.partsInSlabs();
+        for (size_t i = 0; i < shown.slabs.size(); ++i) {
+            const Difference difference = differenceOf(shown, shown.slabs[i], inSlabs[i]);
+            if (difference.area > 0) byPage[shown.slabs[i].page].push_back(difference);
+        }
+        int compared = 0;
+        for (auto& [page, slabs] : byPage) {
+            if (slabs.size() < 30) continue;
+            ++compared;
+            std::ranges::sort(slabs, {}, &Difference::deltaE);
+            double all = 0, above = 0, p90 = 0, p99 = 0, whole = 0;
+            for (const Difference& each : slabs) all += each.area;
+            for (auto each = slabs.rbegin(); each != slabs.rend(); ++each) {
+                above += each->area;
+                if (p99 == 0 && above > 0.01 * all) p99 = each->deltaE;
+                if (p90 == 0 && above > 0.1 * all) p90 = each->deltaE;
+                if (each->area > 0.5 / double(slabs.size()) * all) whole = std::max(whole, each->deltaE);
+            }
+            const PageEntry& entry = shown.data().pages[page];
+            EXPECT_GE(colourErrorOf(entry.colourErrorP95), 0.9 * p90 - 0.5) << page;
+            EXPECT_LE(colourErrorOf(entry.colourErrorP95), 1.1 * p99 + 1) << page;
+            EXPECT_GE(colourErrorOf(entry.colourErrorMax), 0.7 * whole - 0.5) << page;
+            EXPECT_GE(entry.colourErrorMax, entry.colourErrorP95) << page;
+        }
+        return compared;
+    }
+
     /// Returns how many levels have at least 20 of the slabs.
     static size_t levelsOf(const std::vector<PlacedSlab>& slabs) {
         std::map<uint32_t, int> count;
@@ -227,6 +287,12 @@ TEST_F(ColourLevels, ACheckerboardKeepsItsLight) {
         EXPECT_NEAR(srgbToLinear(double(slab.colour & 255u) / 255), 0.5, 0.1);
     }
     EXPECT_GT(mixed, 20);
+    EXPECT_GE(compareErrors(shown), 5);
+    EXPECT_EQ(shown.data().header.version, kColourErrorsFileVersion);
+    // Where halves of cells are as large as squares, slabs are far off; where they hold many, grey is what there is.
+    const FileHeader& header = shown.data().header;
+    EXPECT_GT(colourErrorOf(shown.data().pages[header.level[header.levels - 2].firstEntry].colourErrorP95), 30);
+    EXPECT_LT(colourErrorOf(shown.data().pages[0].colourErrorP95), 20);
 }
 
 TEST_F(ColourLevels, SurfacesOfAnyColourKeepTheirLight) {
@@ -236,8 +302,20 @@ TEST_F(ColourLevels, SurfacesOfAnyColourKeepTheirLight) {
         PaintedMesh ball{test::sphereMesh({0, 0, 0}, 10, rings), {}};
         for (size_t v = 0; v < ball.mesh.positions.size(); ++v) ball.colours.push_back(uint32_t(random()));
         build(ball, 0.12);
-        EXPECT_GE(levelsOf(compare(Shown(folder_ / "out.vcp", 3))), 3u);
+        const Shown shown(folder_ / "out.vcp", 3);
+        EXPECT_GE(levelsOf(compare(shown)), 3u);
+        EXPECT_GE(compareErrors(shown), 3);
     }
+}
+
+TEST_F(ColourLevels, OneColourIsNowhereOff) {
+    PaintedMesh ball{test::sphereMesh({0, 0, 0}, 10, 40), {}};
+    ball.colours.assign(ball.mesh.positions.size(), 0xff20a0c0u);
+    build(ball, 0.3);
+    const Shown shown(folder_ / "out.vcp", 3);
+    EXPECT_GT(shown.slabs.size(), 100u);
+    // But for the rounding of single precision.
+    for (const PageEntry& page : shown.data().pages) EXPECT_LE(colourErrorOf(page.colourErrorMax), 0.01);
 }
 
 }  // namespace

@@ -42,6 +42,10 @@ with vcp.open("tree.vcp", width=160, height=120, progress=lambda opened, dataset
 
     # Looks: what is set is what is got.
     assert view.look["shading"] == "lit" and view.look["samples"] == 16
+    assert not view.look["plain"] and view.look["colour_error"] == 6
+    view.set_look(plain=True, colour_error=5)
+    assert view.look["plain"] and view.look["colour_error"] == 5 and not view.stats["colour_limits"]
+    view.set_look(plain=False, colour_error=6)
     view.set_look(shading="normals", transparent=True)
     assert view.look["shading"] == "normals" and view.look["transparent"]
     view.settle()

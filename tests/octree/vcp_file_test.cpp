@@ -359,7 +359,7 @@ TEST_F(VcpFile, WrongMagicAndVersion) {
     EXPECT_EQ(past.error().code, ErrorCode::Unsupported);
     EXPECT_EQ(
         past.error().line(),
-        "memory.vcp: header: byte 8: file version 2 is not known; this program reads versions 3 to 9: build it again");
+        "memory.vcp: header: byte 8: file version 2 is not known; this program reads versions 3 to 10: build it again");
 }
 
 TEST_F(VcpFile, HeaderLiesAreFound) {
@@ -508,6 +508,55 @@ TEST_F(VcpFile, MarksAskForTheNewerVersion) {
     }
 }
 
+TEST(ColourErrorCode, IsTheLeastThatIsEnough) {
+    EXPECT_EQ(colourErrorCode(0), 0);
+    EXPECT_EQ(colourErrorOf(0), 0);
+    EXPECT_EQ(colourErrorOf(255), kMostColourError);
+    for (uint32_t code = 1; code <= 255; ++code) {
+        EXPECT_EQ(colourErrorCode(colourErrorOf(code)), code);
+        EXPECT_EQ(colourErrorCode(std::nextafter(colourErrorOf(code - 1), 200)), code);
+    }
+    EXPECT_EQ(colourErrorCode(1000), 255);
+}
+
+/// Writes a file of one page with slabs, and reads its directory.
+Result<Dataset> datasetOfSlabs(uint8_t p95, uint8_t max, uint32_t flags) {
+    const TestFolder folder("vcp_colour_errors_test");
+    VCP_TRY_ASSIGN(auto writer, VcpWriter::create(folder / "one.vcp", 1));
+    StoredPage page{std::vector<std::byte>(40), {}, 1024, 0};
+    if ((flags & kFlagColour) != 0) page.colour.resize(40), page.colourBytes = 1024;
+    PageEntry entry{.leaves = 3, .slabLeaves = 3};
+    entry.colourErrorP95 = p95, entry.colourErrorMax = max;
+    VCP_TRY(writer->append(entry, page));
+    FileHeader h;
+    h.levels = 1;
+    h.log2Cells = 5;
+    h.cell = 1;
+    h.flags = flags;
+    h.level[0] = {0, 1, 0};
+    VCP_TRY(writer->commit(h));
+    return readDataset(MemoryFile(bytesOf(folder / "one.vcp")));
+}
+
+TEST(VcpFileVersion, ColourErrorsAskForTheNewestVersion) {
+    const auto with = datasetOfSlabs(9, 20, kFlagColour);
+    ASSERT_TRUE(with.ok()) << with.error().line();
+    EXPECT_EQ(with->header.version, kColourErrorsFileVersion);
+    EXPECT_EQ(with->header.flags, kFlagColour | kFlagColourErrors);
+    EXPECT_EQ(with->pages[0].colourErrorP95, 9);
+    EXPECT_EQ(with->pages[0].colourErrorMax, 20u);
+    EXPECT_EQ(with->pages[0].slabLeaves, 3u);
+    const auto without = datasetOfSlabs(0, 0, kFlagColour);
+    ASSERT_TRUE(without.ok()) << without.error().line();
+    EXPECT_EQ(without->header.version, kFileVersion);
+    EXPECT_EQ(without->header.flags, kFlagColour);
+    for (const auto& [wrong, words] : {std::pair(datasetOfSlabs(21, 20, kFlagColour), "of 95 % more than of all"),
+                                       std::pair(datasetOfSlabs(9, 20, 0), "nothing in the flags")}) {
+        ASSERT_FALSE(wrong.ok());
+        EXPECT_NE(wrong.error().line().find(words), std::string::npos) << wrong.error().line();
+    }
+}
+
 TEST_F(VcpFile, HugeCountsAllocateNothing) {
     const uint64_t before = test::peakBytes();
     for (const uint64_t pages : {uint64_t{1} << 20, uint64_t{1} << 31, uint64_t{1} << 40, ~uint64_t{0}})
@@ -549,8 +598,8 @@ TEST_F(VcpFile, DirectoryLiesAreFound) {
     expectRefused("certified error", [](F& f) { f.entry(1).certifiedError = -1; });
     expectRefused("certified error", [](F& f) { f.entry(1).certifiedError = std::numeric_limits<float>::quiet_NaN(); });
     expectRefused("counts", [](F& f) { f.entry(1).hardLeaves = f.entry(1).leaves + 1; });
-    expectRefused("more slab leaves", [](F& f) { f.entry(1).slabLeaves = f.entry(1).leaves + 1; });
-    expectRefused("more slab leaves", [](F& f) { f.entry(1).slabLeaves = f.header().version = 3; });
+    expectRefused("more slab leaves", [](F& f) { f.entry(1).slabLeaves = (f.entry(1).leaves + 1) & 0xffffffu; });
+    expectRefused("more slab leaves", [](F& f) { f.entry(1).slabLeaves = 3, f.header().version = 3; });
     expectRefused("wrong child pages", [](F& f) { f.entry(0).firstChild = 2; });
     expectRefused("wrong child pages", [](F& f) { f.entry(0).firstChild = 0; });
     expectRefused("wrong child pages", [](F& f) { f.entry(4).childMask = 1; });
@@ -568,7 +617,9 @@ TEST_F(VcpFile, DirectoryLiesAreFound) {
     expectRefused(at(1, offsetof(PageEntry, certifiedError)) + "certified error is larger",
                   [](F& f) { f.header().level[1].certifiedError = f.header().certifiedErrorMax = 0; });
     expectRefused(at(2, offsetof(PageEntry, leaves)) + "leaf counts", [](F& f) { f.entry(2).leaves = 0xffffffff; });
-    expectRefused(at(3, offsetof(PageEntry, reserved)) + "reserved", [](F& f) { f.entry(3).reserved = 1; });
+    expectRefused(at(3, offsetof(PageEntry, colourErrorP95)) + "colour error: of 95 % more than of all",
+                  [](F& f) { f.entry(3).colourErrorP95 = 1; });
+    expectRefused(at(3, 79) + "a colour error where no slab can have one", [](F& f) { f.entry(3).colourErrorMax = 1; });
     expectRefused(at(0, offsetof(PageEntry, colourStoredBytes)) + "has colour", [](F& f) { f.header().flags = 0; });
     expectRefused(at(0, offsetof(PageEntry, colourOffset)) + "a place of colour", [](F& f) {
         f.header().flags = 0;
@@ -763,7 +814,7 @@ TEST_F(VcpFile, HostileFieldsAreRefused) {
         {"colourHash", 32, '8'},     {"storedBytes", 40, '4'}, {"pageBytes", 44, '4'}, {"colourStoredBytes", 48, '4'},
         {"colourBytes", 52, '4'},    {"firstChild", 56, '4'},  {"leaves", 60, '4'},    {"hardLeaves", 64, '4'},
         {"certifiedError", 68, 'f'}, {"childMask", 72, '1'},   {"level", 73, '1'},     {"reserved", 74, '1'},
-        {"reserved", 75, '1'},       {"slabLeaves", 76, '4'}};
+        {"colourErrorP95", 75, '1'}, {"slabLeaves", 76, '4'}};
     const uint64_t before = test::peakBytes();
     uint64_t tried = 0;
     const auto sweep = [&](const std::vector<Field>& fields, uint64_t base) {

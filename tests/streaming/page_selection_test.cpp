@@ -110,6 +110,71 @@ TEST(PageSelection, BudgetIsNeverExceededAndRelaxesEvenly) {
     }
 }
 
+/// The full tree, whose slabs' colours are off by so much (a code of colourErrorOf), but those of the finest pages.
+Dataset colouredTree(uint32_t levels, double error, uint8_t code) {
+    Dataset dataset = fullTree(levels, error);
+    for (uint64_t i = 0; i < dataset.pages.size(); ++i) {
+        PageEntry& page = dataset.pages[i];
+        if (page.childMask != 0) page.colourErrorP95 = code, page.colourErrorMax = code;
+    }
+    return dataset;
+}
+
+SelectionView colouredView(glm::dvec3 eye, double colourError, double errorPixels = 1) {
+    SelectionView view = viewFrom(eye, errorPixels);
+    view.colourError = colourError;
+    return view;
+}
+
+TEST(PageSelection, ColoursThatAreOffAreRefinedUntilTheirSlabsAreSmall) {
+    const uint8_t code = colourErrorCode(5);
+    const Input in(colouredTree(5, 1e-6, code));
+    const SelectionView view = colouredView({-12, 0.5, 0.5}, 2);
+    const Selection selection = in.select(view);
+    expectCutCovers(in, selection.cut);
+    std::set<int> levels;
+    for (const uint64_t page : selection.cut) {
+        const PageEntry& entry = in.dataset.pages[page];
+        levels.insert(entry.level);
+        const double distance = 12 + in.dataset.originOf(entry).x;  // at least
+        const double slab = in.dataset.cellOf(entry.level) * view.pixelsPerUnit / distance;
+        EXPECT_TRUE(entry.childMask == 0 || slab < view.errorPixels * 1.1) << slab;
+        EXPECT_GT(slab, view.errorPixels / 2.2) << "finer than needed";
+    }
+    EXPECT_EQ(levels.count(0), 0u);
+    EXPECT_GT(selection.colourPixels, selection.errorPixels);
+    EXPECT_LE(selection.colourPixels, view.errorPixels);
+    EXPECT_LT(selection.errorPixels, 0.01);
+}
+
+TEST(PageSelection, ColoursThatAreNearEnoughRefineNothing) {
+    const Input coloured(colouredTree(5, 0.01, colourErrorCode(5))), plain(fullTree(5, 0.01));
+    for (const glm::dvec3 eye : {glm::dvec3(-12, 0.5, 0.5), glm::dvec3(-0.5, 0.2, 0.7), glm::dvec3(0.5)}) {
+        const Selection wanted = plain.select(viewFrom(eye));
+        for (const double allowed : {5.2, 100.0, std::numeric_limits<double>::infinity()}) {
+            const Selection selection = coloured.select(colouredView(eye, allowed));
+            EXPECT_EQ(selection.cut, wanted.cut);
+            EXPECT_EQ(selection.errorPixels, wanted.errorPixels);
+            EXPECT_EQ(selection.colourPixels, 0);
+        }
+        EXPECT_EQ(plain.select(colouredView(eye, 0)).cut, wanted.cut) << "nothing is known of colours";
+    }
+}
+
+TEST(PageSelection, ABudgetRelaxesColoursEvenly) {
+    const Input in(colouredTree(4, 1e-6, 255));
+    double last = std::numeric_limits<double>::infinity();
+    for (uint64_t pages = 1; pages < 600; pages += 13) {
+        const Selection selection = in.select(colouredView({-2, 0.3, 0.6}, 2, 0.01), pages * kPageBytes);
+        EXPECT_LE(selection.wanted.size(), pages);
+        expectCutCovers(in, selection.cut);
+        EXPECT_LE(selection.colourPixels, last) << "more budget, more error";
+        last = selection.colourPixels;
+        EXPECT_EQ(selection.relaxed, pages < in.dataset.pages.size());
+    }
+    EXPECT_EQ(last, 0);
+}
+
 TEST(PageSelection, NothingFitsAnEmptyBudget) {
     const Input in(fullTree(2, 0.01));
     const Selection selection = in.select(viewFrom({-1, 0, 0}), kPageBytes - 1);

@@ -166,7 +166,7 @@ inline AnalyticDataset analyticDataset(const SignedDistanceField& field, const A
         entry.morton = mortonEncode(at);
         entry.level = uint8_t(level);
         entry.leaves = page.softLeaves + page.slabLeaves;
-        entry.slabLeaves = page.slabLeaves;
+        entry.slabLeaves = page.slabLeaves & 0xffffffu;
         entry.pageBytes = uint32_t(page.bytes.geometryBytes().size());
         entry.certifiedError = float(o.errorCells * o.finestCell * std::exp2(double(o.levels - 1 - level)) * 1.0000002);
         result.dataset.pages.push_back(entry);

@@ -407,6 +407,9 @@ static void wrong_calls(void) {
     look.error_pixels = -1;
     CHECK(vcp_view_set_look(view, &look) == VCP_USAGE);
     look.error_pixels = 1;
+    look.colour_error = -1;
+    CHECK(vcp_view_set_look(view, &look) == VCP_USAGE);
+    look.colour_error = 1;
     look.section_count = 7;
     CHECK(vcp_view_set_look(view, &look) == VCP_USAGE);
     look.section_count = 1;
@@ -624,9 +627,12 @@ static void looks(void) {
     look.section_count = 1;
     look.sections[0][0] = 1;
     look.section_caps = 1;
+    look.colour_error = 7;
+    look.plain = 1;
     OK(vcp_view_set_look(view, &look));
     OK(vcp_view_get_look(view, &after));
     CHECK(after.shading == VCP_SHADING_CLAY && after.samples == 4 && after.section_caps == 1);
+    CHECK(after.colour_error == 7 && after.plain == 1 && before.colour_error == 6 && before.plain == 0);
     CHECK(after.error_pixels == before.error_pixels && after.light[1] == before.light[1] &&
           after.background_top[2] == before.background_top[2]);
     /* Seen from the side that is cut away, the cap is at x = 0; without caps the ball's inside is, behind it. */

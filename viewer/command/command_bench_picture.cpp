@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "octree/vcp_file.h"
 #include "render/pixel_samples.h"
 #include "viewer/bench/picture/bench_colour.h"
 #include "viewer/bench/picture/bench_picture.h"
@@ -103,6 +104,13 @@ RunCommand addBenchColour(CLI::App& bench) {
     addNames(*app, "--methods", options.methods, fmt::format("{} [all]", fmt::join(colourMethodNames(), ", ")));
     addNames(*app, "--cameras", options.cameras, fmt::format("{} [all]", fmt::join(colourCameraNames(), ", ")));
     addPictureOptions(*app, options, command->size);
+    app->add_option("--colour-error", options.colourErrors,
+                    "Differences of colours that a picture may have, as \u0394E: 1,2,4")
+        ->type_name("X,X")
+        ->delimiter(',')
+        ->allow_extra_args(false)
+        ->capture_default_str()
+        ->check(CLI::Range(0.0, kMostColourError));
     addNumber(*app, "--picture-samples", options.pictureSamples, "All pictures compared have N x N rays a pixel", 8);
     app->add_flag("--images,!--no-images", options.images, "Keep images in what is built, and draw from them [on]");
     app->add_flag("--pictures", options.pictures, "Also write the pictures into --out");

@@ -20,6 +20,7 @@ struct InfoCommand {
 /// Sums over the pages of a level.
 struct LevelSums {
     uint64_t storedBytes = 0, colourStoredBytes = 0, pageBytes = 0, leaves = 0, slabLeaves = 0, hardLeaves = 0;
+    uint32_t colourErrorP95 = 0, colourErrorMax = 0;  ///< of the page that has most, as its entry has them
 };
 
 LevelSums sumsOf(const Dataset& dataset, uint32_t level) {
@@ -33,6 +34,8 @@ LevelSums sumsOf(const Dataset& dataset, uint32_t level) {
         sums.leaves += page.leaves;
         sums.slabLeaves += page.slabLeaves;
         sums.hardLeaves += page.hardLeaves;
+        sums.colourErrorP95 = std::max(sums.colourErrorP95, uint32_t{page.colourErrorP95});
+        sums.colourErrorMax = std::max(sums.colourErrorMax, uint32_t{page.colourErrorMax});
     }
     return sums;
 }
@@ -63,8 +66,10 @@ Json toJson(const std::string& file, const Dataset& dataset, uint64_t shards) {
     const FileHeader& h = dataset.header;
     Json levels = Json::array();
     const StoredBytes bytes = storedBytesOf(dataset);
+    const bool hasErrors = dataset.hasColourErrors();
     for (uint32_t level = 0; level < h.levels; ++level) {
         const LevelSums sums = sumsOf(dataset, level);
+        const auto deltaE = [&](uint32_t code) { return hasErrors ? Json(colourErrorOf(code)) : Json(); };
         levels.push_back({{"level", level},
                           {"cell", dataset.cellOf(level)},
                           {"subvolumes", h.level[level].pages},
@@ -74,7 +79,9 @@ Json toJson(const std::string& file, const Dataset& dataset, uint64_t shards) {
                           {"leaves", sums.leaves},
                           {"slab_leaves", sums.slabLeaves},
                           {"hard_leaves", sums.hardLeaves},
-                          {"certified_error_max", h.level[level].certifiedError}});
+                          {"certified_error_max", h.level[level].certifiedError},
+                          {"colour_error_p95", deltaE(sums.colourErrorP95)},
+                          {"colour_error_max", deltaE(sums.colourErrorMax)}});
     }
     return {{"file", file},
             {"version", h.version},
@@ -157,15 +164,21 @@ std::string summary(const std::string& file, const Dataset& dataset, uint64_t sh
         text +=
             fmt::format("  error       certified {} ({:.3f} cells), asked for {}\n", formatLength(h.certifiedErrorMax),
                         h.certifiedErrorMax / h.cell, formatLength(h.errorTarget));
-    text += fmt::format("\n  {:>5} {:>11} {:>11} {:>11} {:>11} {:>13} {:>13} {:>13} {:>15}\n", "level", "cell",
-                        "subvolumes", "stored", "in memory", "leaves", "slabs", "hard", "certified error");
+    const bool hasErrors = dataset.hasColourErrors();
+    text += fmt::format("\n  {:>5} {:>11} {:>11} {:>11} {:>11} {:>13} {:>13} {:>13} {:>15}{}\n", "level", "cell",
+                        "subvolumes", "stored", "in memory", "leaves", "slabs", "hard", "certified error",
+                        hasErrors ? "  colour \u0394E, max" : "");
     for (uint32_t level = 0; level < h.levels; ++level) {
         const LevelSums sums = sumsOf(dataset, level);
-        text += fmt::format("  {:>5} {:>11} {:>11} {:>11} {:>11} {:>13} {:>13} {:>13} {:>15}\n", level,
+        const std::string colours = hasErrors && sums.slabLeaves > 0
+                                        ? fmt::format(" {:>10.2f}, {:.2f}", colourErrorOf(sums.colourErrorP95),
+                                                      colourErrorOf(sums.colourErrorMax))
+                                        : "";
+        text += fmt::format("  {:>5} {:>11} {:>11} {:>11} {:>11} {:>13} {:>13} {:>13} {:>15}{}\n", level,
                             formatLength(dataset.cellOf(level)), formatCount(h.level[level].pages),
                             formatBytes(sums.storedBytes), formatBytes(sums.pageBytes), formatCount(sums.leaves),
                             formatCount(sums.slabLeaves), formatCount(sums.hardLeaves),
-                            formatLength(h.level[level].certifiedError));
+                            formatLength(h.level[level].certifiedError), colours);
     }
     text.pop_back();
     return text;

@@ -148,6 +148,7 @@ FrameRequest requestFor(const RenderCommand& command, const OpenedScene& open, c
     request.height = uint32_t(command.size.y);
     request.errorPixels = command.render.errorPixels;
     request.shading = command.render.shading;
+    request.colourError = colourErrorIn(request.shading.mode, command.render.colourError);
     request.shading.transparent = command.transparent;
     request.sections = command.render.sectionPlanes(bounds);
     request.sectionCaps = command.render.caps;

@@ -121,6 +121,11 @@ void addDistances(Json& json, const SurfaceDistance& distance) {
     json["surface_to_mesh_cells"] = toJson(inCells(distance.surfaceToMesh, distance.cell));
     json["normal_degrees"] = toJson(distance.normalDegrees);
     if (distance.colourSamples > 0) json["colour_delta_e"] = toJson(distance.colourDifference);
+    if (const SlabColours& slabs = distance.slabColours; slabs.max > 0)
+        json["slab_colours"] = {{"samples", slabs.samples},
+                                {"rms", slabs.rms},
+                                {"colour_error_p95", slabs.p95},
+                                {"colour_error_max", slabs.max}};
     json["cell"] = distance.cell;
     json["certified_error_max"] = distance.certifiedErrorMax;
     json["samples"] = distance.samples;
@@ -146,6 +151,9 @@ std::string distanceTable(const SurfaceDistance& distance) {
         text += fmt::format("  {:<16} {:>11.2f} {:>11.2f} {:>11.2f} {:>11.2f}\n", "colour, \u0394E", colour.p50,
                             colour.p95, colour.p99, colour.max);
     }
+    if (const SlabColours& slabs = distance.slabColours; slabs.max > 0)
+        text += fmt::format("  {:<16} {:>11.2f}; pages say {:.2f} of 95 %, {:.2f} of all\n", "  of slabs, rms",
+                            slabs.rms, slabs.p95, slabs.max);
     text += fmt::format("  {:<16} {:>47}\n  {:<16} {:>47.5f}", "certified", formatLength(distance.certifiedErrorMax),
                         "  in cells", distance.certifiedErrorMax / distance.cell);
     return text;

@@ -44,6 +44,8 @@ Json toJson(const WindowReport& report) {
             {"settled", status.update.settled},
             {"detail", nameOf(status.detail)},
             {"error_pixels", status.update.errorPixels},
+            {"colour_pixels", status.update.colourPixels},
+            {"limited_by", nameOf(detailLimitOf(status.update))},
             {"resident_bytes", status.update.residentBytes},
             {"bytes_read", status.update.bytesRead},
             {"hit_pixels", status.frame.hitPixels},

@@ -124,6 +124,13 @@ void addRenderSettings(CLI::App& app, RenderSettings& settings) {
         ->type_name("PIXELS")
         ->capture_default_str()
         ->check(CLI::Range(0.01, 1000.0));
+    app.add_option(
+           "--colour-error", settings.colourError,
+           "Difference of colours that may be seen, as \u0394E (black and white differ by 100): detail is loaded "
+           "until what is coarser than that has no more than the pixels of --error-pixels; 100: any")
+        ->type_name("DELTA_E")
+        ->capture_default_str()
+        ->check(CLI::Range(0.0, kMostColourError));
     addBudget(app, "--budget", settings.budgetBytes, "Memory of the device that detail may take, never exceeded")
         ->default_str("512M");
     addBudget(app, "--ram", settings.ramBytes,

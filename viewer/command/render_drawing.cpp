@@ -119,6 +119,8 @@ Json toJson(const Drawing& drawing, const DeviceInfo& device, const FrameRequest
             {"settled", drawing.update.settled},
             {"detail", nameOf(detailOf(drawing.update, request.errorPixels))},
             {"error_pixels", drawing.update.errorPixels},
+            {"colour_pixels", drawing.update.colourPixels},
+            {"limited_by", nameOf(detailLimitOf(drawing.update))},
             {"subvolumes_in_cut", stats.pagesInCut},
             {"resident_bytes", drawing.update.residentBytes},
             {"bytes_read", drawing.update.bytesRead},
@@ -129,8 +131,9 @@ Json toJson(const Drawing& drawing, const DeviceInfo& device, const FrameRequest
 std::string summary(const RenderCommand& command, const Drawing& drawing, const DeviceInfo& device,
                     double askedPixels) {
     const UpdateResult& update = drawing.update;
-    const std::string error = std::isfinite(update.errorPixels) ? fmt::format("error {:.2g} pixels", update.errorPixels)
-                                                                : "no certified error";
+    std::string error = std::isfinite(update.errorPixels) ? fmt::format("error {:.2g} pixels", update.errorPixels)
+                                                          : "no certified error";
+    if (update.colourPixels > 0) error += fmt::format(", colours off within {:.2g}", update.colourPixels);
     const std::string samples = drawing.samples > 1 ? fmt::format(", {} samples in {}", drawing.samples,
                                                                   formatSeconds(1e-3 * drawing.samplesMs))
                                                     : "";
@@ -175,6 +178,8 @@ Json toJson(const TiledPictureStats& total, size_t pictures, uint32_t samples, c
             {"settled", total.update.settled},
             {"detail", nameOf(detailOf(total.update, request.errorPixels))},
             {"error_pixels", total.errorPixels},
+            {"colour_pixels", total.colourPixels},
+            {"limited_by", nameOf(detailLimitOf(total.update))},
             {"resident_bytes", total.update.residentBytes},
             {"bytes_read", total.update.bytesRead}};
 }

@@ -68,6 +68,7 @@ Result<void> PictureSequence::finish() {
     stats_.hitPixels += drawn.hitPixels;
     stats_.ms += drawn.ms;
     stats_.errorPixels = std::max(stats_.errorPixels, drawn.errorPixels);
+    stats_.colourPixels = std::max(stats_.colourPixels, drawn.colourPixels);
     stats_.update = drawn.update;
     stats_.onHost = drawn.onHost;
     depth_.clear();

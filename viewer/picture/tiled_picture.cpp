@@ -74,6 +74,7 @@ Result<bool> TiledPicture::step() {
         }
         if (!update.settled) return false;  // what its rays hit may be too coarse
         stats_.errorPixels = std::max(stats_.errorPixels, update.errorPixels);
+        stats_.colourPixels = std::max(stats_.colourPixels, update.colourPixels);
         stats_.update = std::move(update);
         begin(*std::exchange(drawn_, std::nullopt));
     }

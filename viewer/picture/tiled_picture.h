@@ -36,10 +36,10 @@ struct PictureBand {
 
 struct TiledPictureStats {
     uint64_t tiles = 0, rays = 0, hitPixels = 0;
-    double ms = 0;           ///< time of drawing alone, of each tile's last frame and its samples, as are the rays
-    double errorPixels = 0;  ///< largest over the tiles
-    UpdateResult update;     ///< the last tile's
-    bool onHost = false;     ///< likewise, as in FrameStats
+    double ms = 0;  ///< time of drawing alone, of each tile's last frame and its samples, as are the rays
+    double errorPixels = 0, colourPixels = 0;  ///< largest over the tiles
+    UpdateResult update;                       ///< the last tile's
+    bool onHost = false;                       ///< likewise, as in FrameStats
 };
 
 /// A picture in the making, tile by tile. What it is given must stay until it is done.

@@ -35,6 +35,7 @@ struct RenderSettings {
     uint64_t budgetBytes = RendererOptions().budgetBytes;
     uint64_t ramBytes = RendererOptions().ramBytes;
     double errorPixels = 0.5;
+    double colourError = kUsualColourError;  ///< ΔE
     CameraChoice camera = View::Fit;
     UpAxis up = UpAxis::Y;
     Shading shading;

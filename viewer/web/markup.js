@@ -79,7 +79,8 @@ export const kMarkup = `
     <span>Side</span><input type="range" data-set="side" aria-label="Side of the light, degrees" min="-180" max="180">
     <span>Height</span><input type="range" data-set="above" aria-label="Height of the light, degrees" min="-90" max="90">
     <div class="wide"><label><input type="checkbox" data-set="shadows">Shadows</label>
-        <label><input type="checkbox" data-set="occlusion">Ambient occlusion</label></div>
+        <label><input type="checkbox" data-set="occlusion">Ambient occlusion</label>
+        <label><input type="checkbox" data-set="plain">Plain materials</label></div>
     <span>Section</span><select data-set="axis" aria-label="Section plane"><option value="">none</option>
         <option value="x">x, keep beyond</option><option value="-x">x, keep before</option>
         <option value="y">y, keep beyond</option><option value="-y">y, keep before</option>

@@ -28,7 +28,7 @@ export interface Annotation {
 export type ShadingMode = 'lit' | 'clay' | 'unlit' | 'normals' | 'level' | 'error' | 'wireframe';
 
 /**
- * `<vcp-viewer src annotations mode theme budget workers draw light environment shadows occlusion section up>`;
+ * `<vcp-viewer src annotations mode theme budget workers draw light environment shadows occlusion plain section up>`;
  * events: load, progress, settled, pick, error.
  */
 export class VcpViewer extends HTMLElement {

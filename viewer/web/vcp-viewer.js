@@ -42,8 +42,8 @@ function measureText(x, error) {
 }
 
 export class VcpViewer extends HTMLElement {
-    static observedAttributes = ['src', 'mode', 'annotations', 'theme', 'light', 'environment', 'shadows', 'occlusion', 'section',
-        'up'];
+    static observedAttributes = ['src', 'mode', 'annotations', 'theme', 'light', 'environment', 'shadows', 'occlusion', 'plain',
+        'section', 'up'];
 
     constructor() {
         super();
@@ -125,6 +125,7 @@ export class VcpViewer extends HTMLElement {
         for (const name of ['side', 'above', 'shadows']) control(name).disabled = isAround;
         control('shadows').checked = this.hasAttribute('shadows');
         control('occlusion').checked = this.hasAttribute('occlusion');
+        control('plain').checked = this.hasAttribute('plain');
         const [axis, place] = (this.getAttribute('section') ?? ',0.5').split(',');
         control('axis').value = axis;
         control('place').value = 100 * Number(place);
@@ -134,7 +135,7 @@ export class VcpViewer extends HTMLElement {
     changed(control) {
         const { panel } = this.parts, value = name => panel.querySelector(`[data-set="${name}"]`).value;
         const what = control.dataset.set;
-        if (what === 'shadows' || what === 'occlusion') this.toggleAttribute(what, control.checked);
+        if (['shadows', 'occlusion', 'plain'].includes(what)) this.toggleAttribute(what, control.checked);
         else if (what === 'environment' && control.value === '') this.removeAttribute(what);
         else if (what === 'environment') this.setAttribute(what, control.value);
         else if (what === 'side' || what === 'above') this.setAttribute('light', `${value('side')},${value('above')}`);
@@ -281,7 +282,7 @@ export class VcpViewer extends HTMLElement {
         this.worker.postMessage({
             type: 'look', width, height, moving, mode, number: ++this.number,
             eye: this.orbit.eye(), forward, up, fov: kFieldOfView, errorPixels: moving ? 1 : 0.5,
-            shadows: this.hasAttribute('shadows'),
+            shadows: this.hasAttribute('shadows'), plain: this.hasAttribute('plain'),
             occlusionRays: this.hasAttribute('occlusion') && !moving ? kOcclusionRays : 0,
             top: theme.top, bottom: theme.bottom, light: this.light.direction(),
             environment: this.environment,

@@ -93,7 +93,8 @@ py::dict toDict(const vcp_look& look) {
                     "light_in_world"_a = look.light_in_world != 0, "transparent"_a = look.transparent != 0,
                     "background_top"_a = triple(look.background_top),
                     "background_bottom"_a = triple(look.background_bottom), "sections"_a = sections,
-                    "section_caps"_a = capsOf(look.section_caps), "samples"_a = look.samples);
+                    "section_caps"_a = capsOf(look.section_caps), "samples"_a = look.samples,
+                    "colour_error"_a = look.colour_error, "plain"_a = look.plain != 0);
 }
 
 void setSections(vcp_look& look, const std::vector<Plane>& planes) {
@@ -111,6 +112,10 @@ vcp_look changed(vcp_look look, const py::kwargs& fields) {
             look.shading = shadingNamed(value.cast<std::string>());
         else if (name == "error_pixels")
             look.error_pixels = value.cast<double>();
+        else if (name == "colour_error")
+            look.colour_error = value.cast<double>();
+        else if (name == "plain")
+            look.plain = flag();
         else if (name == "shadows")
             look.shadows = flag();
         else if (name == "occlusion_rays")
@@ -146,7 +151,8 @@ py::dict toDict(const vcp_stats& s) {
                     "hit_pixels"_a = s.hit_pixels, "samples"_a = s.samples, "detail"_a = s.detail,
                     "resident_bytes"_a = s.resident_bytes, "pool_bytes"_a = s.pool_bytes, "bytes_read"_a = s.bytes_read,
                     "pages_resident"_a = s.pages_resident, "pages_drawn"_a = s.pages_drawn,
-                    "device_losses"_a = s.device_losses, "processor_rays"_a = s.processor_rays != 0);
+                    "device_losses"_a = s.device_losses, "processor_rays"_a = s.processor_rays != 0,
+                    "colour_limits"_a = s.colour_limits != 0, "colour_pixels"_a = s.colour_pixels);
 }
 
 py::object pickOf(View& view, double x, double y) {

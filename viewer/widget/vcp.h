@@ -336,6 +336,11 @@ typedef struct vcp_look {
     /* 1: what the planes cut open of closed parts is filled, and open surfaces show as lines; 2: all is filled as if it
      * were closed, as it is where a file does not say which parts are */
     uint32_t section_caps;
+    /* ΔE, 100 for black and white: where slabs' colours differ by more from what they stand for, detail is read until
+     * they are no larger than error_pixels; 0: 6; 100: colours do not count */
+    double colour_error;
+    uint32_t plain; /* 1: plain light, also where materials have normals, roughness, metalness or emission */
+    uint32_t reserved;
 } vcp_look;
 
 VCP_API vcp_status vcp_view_get_look(vcp_view* view, vcp_look* look);
@@ -454,7 +459,8 @@ typedef struct vcp_stats {
     uint32_t samples;        /* rays a pixel, so far, of the last picture */
     uint32_t detail;         /* limited by 0: loading, 1: nothing, 2: the finest level, 3: the budget */
     uint32_t processor_rays; /* 1: the processor cast the rays of the last picture itself, and no shader ran */
-    uint32_t reserved;
+    uint32_t colour_limits;  /* 1: colours err most in the picture, and are refined next; 0: distances */
+    double colour_pixels; /* edge of the widest slabs in the picture whose colours are off by more than colour_error */
 } vcp_stats;
 
 VCP_API vcp_status vcp_view_stats(vcp_view* view, vcp_stats* stats);

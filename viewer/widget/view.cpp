@@ -248,6 +248,8 @@ vcp_look lookOf(const Viewer& viewer) {
     look.transparent = shading.transparent ? 1 : 0;
     look.samples = viewer.samples();
     look.section_caps = uint32_t(viewer.sectionCaps());
+    look.colour_error = viewer.colourError();
+    look.plain = shading.channels ? 0 : 1;
     for (int i = 0; i < 3; ++i) {
         look.light[i] = shading.lightDirection[i];
         look.background_top[i] = shading.backgroundTop[i];
@@ -266,6 +268,7 @@ void fillIn(vcp_look& look, bool hasWindow) {
     const Shading usual;
     const auto isZero = [](const float* values) { return vectorFrom(values) == glm::vec3(0); };
     if (look.error_pixels == 0) look.error_pixels = ViewerOptions{}.errorPixels;
+    if (look.colour_error == 0) look.colour_error = ViewerOptions{}.colourError;
     if (look.samples == 0) look.samples = usualSamples(hasWindow);
     const bool hasBackground = !isZero(look.background_top) || !isZero(look.background_bottom);
     const bool hasLight = !isZero(look.light);
@@ -281,6 +284,7 @@ Result<void> checkLook(const vcp_look& look) {
     if (look.shading < VCP_SHADING_LIT || look.shading > VCP_SHADING_WIREFRAME)
         return wrong("there is no such shading");
     if (!(look.error_pixels > 0) || !std::isfinite(look.error_pixels)) return wrong("error_pixels is not above 0");
+    if (!(look.colour_error > 0) || !std::isfinite(look.colour_error)) return wrong("colour_error is not above 0");
     if (look.occlusion_rays > kMostOcclusionRays) return wrong("more than 64 occlusion rays");
     if (!(look.occlusion_radius >= 0) || !std::isfinite(look.occlusion_radius))
         return wrong("occlusion_radius is below 0 or not finite");
@@ -320,6 +324,7 @@ Result<void> setLook(vcp_view& view, const vcp_look* given) {
     shading.occlusionRadius = look.occlusion_radius;
     shading.lightFollowsCamera = look.light_in_world == 0;
     shading.transparent = look.transparent != 0;
+    shading.channels = look.plain == 0;
     shading.lightDirection = vectorFrom(look.light);
     shading.backgroundTop = vectorFrom(look.background_top);
     shading.backgroundBottom = vectorFrom(look.background_bottom);
@@ -328,6 +333,7 @@ Result<void> setLook(vcp_view& view, const vcp_look* given) {
         sections.push_back({vectorFrom(look.sections[i]), look.sections[i][3]});
     viewer.setShading(shading);
     viewer.setErrorPixels(look.error_pixels);
+    viewer.setColourError(look.colour_error);
     viewer.setSamples(look.samples);
     viewer.setSections(std::move(sections));
     viewer.setSectionCaps(vcp::Caps(std::min(look.section_caps, 2u)));
@@ -349,6 +355,8 @@ vcp_stats statsOf(const Viewer& viewer) {
     stats.processor_rays = status.frame.onHost ? 1 : 0;
     stats.frame_ms = status.frame.msFrame;
     stats.error_pixels = update.errorPixels;
+    stats.colour_pixels = update.colourPixels;
+    stats.colour_limits = detailLimitOf(update) == DetailLimit::Colour ? 1 : 0;
     stats.rays = status.frame.rays;
     stats.hit_pixels = status.frame.hitPixels;
     stats.resident_bytes = update.residentBytes;

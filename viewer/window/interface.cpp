@@ -219,7 +219,7 @@ void Interface::layOutOpenMenu() {
 std::string Interface::stateText() const {
     const ViewerStatus& status = session_->viewer().status();
     const UpdateResult& update = status.update;
-    const std::string error = formatPixels(update.errorPixels) + " px";
+    const std::string error = formatPixels(refinedPixels(update)) + " px";
     // In steps of 5: each new text is a new picture of the window.
     if (status.drawnPart < 1) return fmt::format("Drawing, {:.0f} %", 5 * std::floor(20 * status.drawnPart));
     switch (status.detail) {
@@ -233,6 +233,12 @@ std::string Interface::stateText() const {
             return fmt::format("Memory is full: sharp to {}", error);
     }
     return {};
+}
+
+/// By how much the picture is off at most, and in what.
+static std::string offText(const UpdateResult& update) {
+    const bool isOfColour = detailLimitOf(update) == DetailLimit::Colour;
+    return fmt::format("{} by {} px at most", isOfColour ? "Colours off" : "Off", formatPixels(refinedPixels(update)));
 }
 
 void Interface::layOutStatus() {
@@ -259,8 +265,7 @@ void Interface::layOutStatus() {
     if (viewer.isOpen()) {
         parts.emplace_back(stateText(), status.detail == Detail::Budget ? palette.problem : palette.ink);
         if (status.detail == Detail::Settled && status.update.drawable)
-            parts.emplace_back(fmt::format("Off by {} px at most", formatPixels(status.update.errorPixels)),
-                               palette.dim);
+            parts.emplace_back(offText(status.update), palette.dim);
         const uint32_t most = std::max(viewer.mostSamples(), status.samples);
         if (most > 1) parts.emplace_back(fmt::format("Samples {} of {}", status.samples, most), palette.dim);
         if (status.reduction > 1)

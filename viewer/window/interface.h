@@ -103,6 +103,7 @@ private:
     void layOutSave();
     void layOutDetails();
     void layOutLimits();
+    void layOutColourError();
 
     /// A card over the dimmed window, with a field that shows what is typed, and what `layOutRest` adds.
     void layOutPage(const char* title, const char* hint, float width, float height, void (Interface::*layOutRest)());

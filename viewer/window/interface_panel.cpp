@@ -406,6 +406,17 @@ void Interface::layOutSave() {
     ImGui::EndDisabled();
 }
 
+void Interface::layOutColourError() {
+    Viewer& viewer = session_->viewer();
+    caption(*look_, "Difference of colours that may be seen");
+    auto error = float(viewer.colourError());
+    ImGui::SetNextItemWidth(-1);
+    const std::string shown = typeset("%.1f");
+    if (ImGui::SliderFloat("##colour", &error, 0.0f, 20.0f, shown.c_str(), kNoTyping))
+        viewer.setColourError(double(error));
+    showTip(*look_, {"Detail is read where colours differ by more than this; black and white differ by 100", ""});
+}
+
 void Interface::layOutLimits() {
     Viewer& viewer = session_->viewer();
     const ViewerStatus& status = viewer.status();
@@ -416,6 +427,7 @@ void Interface::layOutLimits() {
     if (ImGui::SliderFloat("##error", &error, 0.1f, 16.0f, shown.c_str(), kNoTyping | ImGuiSliderFlags_Logarithmic))
         viewer.setErrorPixels(double(error));
     showTip(*look_, {"Detail is read until the picture errs by no more than this", ""});
+    if (session_->viewer().hasColourErrors()) layOutColourError();
     caption(*look_, "Memory that detail may take");
     uint64_t budget = status.budgetBytes;
     const float right = ImGui::GetCursorPosX() + ImGui::GetContentRegionAvail().x;
@@ -438,6 +450,7 @@ void Interface::layOutDetails() {
     const glm::ivec2 size = session_->viewer().size();
     valueRow(*look_, "State", stateText());
     if (std::isfinite(update.errorPixels)) valueRow(*look_, "Error now", formatPixels(update.errorPixels) + " px");
+    if (update.colourPixels > 0) valueRow(*look_, "Colours off within", formatPixels(update.colourPixels) + " px");
     if (status.levels > 0) {
         valueRow(*look_, "Levels drawn",
                  fmt::format("{} to {} of 0 to {}", update.coarsestLevel, update.finestLevel, status.levels - 1));

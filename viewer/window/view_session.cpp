@@ -57,6 +57,7 @@ Result<std::unique_ptr<ViewSession>> ViewSession::create(const SessionOptions& o
     viewerOptions.renderer.colour = true;
     viewerOptions.renderer.surface = std::move(surface);
     viewerOptions.errorPixels = options.render.errorPixels;
+    viewerOptions.colourError = options.render.colourError;
     viewerOptions.shading = options.render.shading;
     viewerOptions.shading.backgroundTop = options.user.backgroundTop;
     viewerOptions.shading.backgroundBottom = options.user.backgroundBottom;

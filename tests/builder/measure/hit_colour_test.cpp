@@ -7,8 +7,8 @@
 #include <gtest/gtest.h>
 
 #include "builder/build.h"
-#include "builder/measure/colour_difference.h"
 #include "builder/measure/surface_distance.h"
+#include "builder/stream/colour_difference.h"
 #include "builder/stream/colour_encoding.h"
 #include "octree/image/image_assembly.h"
 #include "tests/support/test_folder.h"

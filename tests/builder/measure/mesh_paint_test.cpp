@@ -5,8 +5,8 @@
 #include <gtest/gtest.h>
 #include <png.h>
 
-#include "builder/measure/colour_difference.h"
 #include "builder/measure/mesh_paint.h"
+#include "builder/stream/colour_difference.h"
 #include "builder/stream/colour_encoding.h"
 #include "builder/texture/texture.h"
 #include "tests/support/test_folder.h"

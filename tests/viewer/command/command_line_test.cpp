@@ -596,6 +596,34 @@ TEST_F(CommandLine, TheHostSaysWhatItDoesNotDraw) {
     EXPECT_FALSE(fs::exists(out));
 }
 
+TEST_F(CommandLine, SaysWhetherDistancesOrColoursLimitAPicture) {
+    const fs::path scan = *folder_ / "painted.ply", made = *folder_ / "painted.vcp";
+    const std::string makeScan = (fs::path(VCP_EXECUTABLE).parent_path() / "make_scan").string();
+    ASSERT_EQ(std::system((makeScan + " --triangles 30000 --colour -o " + scan.string() + " >/dev/null").c_str()), 0);
+    ASSERT_EQ(run({"build", scan.string(), "-o", made.string()}).status, 0);
+    const Json coarse = Json::parse(run({"info", made.string(), "--json"}).out)["level"][0];
+    EXPECT_GT(coarse["colour_error_p95"], 6);
+    EXPECT_GE(coarse["colour_error_max"], coarse["colour_error_p95"]);
+    const auto draw = [&](const char* camera, const char* colourError, const char* shading) {
+        const Ran ran =
+            run({"render", made.string(), "-o", (*folder_ / "painted.png").string(), "--size", "160x120", "--device",
+                 "host", "--camera", camera, "--colour-error", colourError, "--shading", shading, "--json"});
+        EXPECT_EQ(ran.status, 0) << ran.err;
+        return Json::parse(ran.out);
+    };
+    const Json any = draw("30,35,0.1", "100", "lit"), near = draw("30,35,0.1", "6", "lit");
+    EXPECT_GT(near["bytes_read"], 5 * double(any["bytes_read"]));
+    EXPECT_EQ(any["colour_pixels"], 0);
+    EXPECT_EQ(any["limited_by"], "geometry");
+    EXPECT_LE(draw("30,35,0.1", "6", "clay")["bytes_read"], any["bytes_read"]) << "no colour is shown";
+    // Slabs that are smaller than half a pixel may be off.
+    const Json far = draw("30,35,0.04", "6", "lit");
+    EXPECT_EQ(far["bytes_read"], any["bytes_read"]);
+    EXPECT_GT(far["colour_pixels"], far["error_pixels"]);
+    EXPECT_LE(far["colour_pixels"], 0.5);
+    EXPECT_EQ(far["limited_by"], "colour");
+}
+
 TEST_F(CommandLine, ADryRunIsNearWhatTheBuildThenTakes) {
     if (!test::kMemoryIsMeasured) GTEST_SKIP() << "sanitizers take memory of their own";
     const fs::path scan = *folder_ / "estimated.ply", made = *folder_ / "estimated.vcp";

@@ -111,6 +111,11 @@ await check('channels are lit as the program lights them, by others, too', async
     const part = other.caster.fit(scan.module, begun.rows, { first: 0, count: begun.bands });
     const done = await other.caster.cast(scan.module, { view, sample: 0, begun, shows: true }, part);
     assert.ok(done.pixels.length > 0 && same(done.pixels, ours.subarray(0, done.pixels.length)));
+    await scan.settle({ ...view, plain: true });
+    const plain = scan.draw();
+    assert.ok(compareColours(plain, ours, 2, i => Number.isFinite(depth[i])).differ > counted / 4, 'plain light is another');
+    await scan.settle(view);
+    assert.ok(same(scan.draw(), ours));
 });
 
 await check('the first picture does not wait for images; no byte is asked for twice', async () => {

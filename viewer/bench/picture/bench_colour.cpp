@@ -5,7 +5,7 @@
 
 #include <fmt/format.h>
 
-#include "builder/measure/colour_difference.h"
+#include "builder/stream/colour_difference.h"
 #include "builder/stream/colour_encoding.h"
 #include "render/picture.h"
 #include "viewer/bench/picture/colour_models.h"
@@ -214,11 +214,19 @@ private:
         return methods;
     }
 
+    /// Returns errors in pixels, each with each colour error.
+    [[nodiscard]] std::vector<std::pair<double, double>> knobs() const {
+        std::vector<std::pair<double, double>> all;
+        for (const double pixels : o_.errorPixels)
+            for (const double colourError : o_.colourErrors) all.emplace_back(pixels, colourError);
+        return all;
+    }
+
     Result<void> addCertified(const BenchModel& model, Methods& methods) const {
-        for (const double pixels : o_.errorPixels) {
+        for (const auto& [pixels, colourError] : knobs()) {
             const auto samples = uint32_t(o_.pictureSamples * o_.pictureSamples);
-            VCP_TRY_ASSIGN(auto drawing,
-                           SettledDrawing::create(model.files.vcp, {o_.device, pixels, samples, o_.repetitions}));
+            VCP_TRY_ASSIGN(auto drawing, SettledDrawing::create(model.files.vcp, {o_.device, pixels, samples,
+                                                                                  o_.repetitions, colourError}));
             methods.push_back(std::make_unique<RendererColours>(std::move(drawing)));
             for (const PageEntry& page : model.cache->dataset().pages) {
                 methods.back()->geometryBytes += page.storedBytes;

@@ -17,6 +17,7 @@
 
 #include "builder/measure/quantile.h"
 #include "octree/io/result.h"
+#include "render/frame_request.h"
 
 namespace vcp {
 
@@ -25,7 +26,8 @@ struct BenchColourOptions {
     std::vector<std::filesystem::path> models;
     std::vector<std::string> methods = {"certified", "vertex", "texture"};
     std::vector<std::string> cameras = {"whole", "half", "close"};
-    std::vector<double> errorPixels = {0.5};  ///< values of the knob of `certified`
+    std::vector<double> errorPixels = {0.5};                 ///< values of the knobs of `certified`
+    std::vector<double> colourErrors = {kUsualColourError};  ///< with each of these
     int pictureSamples = 4;  ///< pictures have so many rays a pixel squared, and so has the mesh of the rivals
     glm::ivec2 size{960, 600};
     int views = 1;        ///< directions each camera looks from, spread over the sphere; a row counts them all

@@ -44,7 +44,9 @@ Result<std::unique_ptr<SettledDrawing>> SettledDrawing::create(std::filesystem::
 
 std::string SettledDrawing::knob() const {
     const std::string samples = options_.samples > 1 ? fmt::format(", samples {}", options_.samples) : "";
-    return fmt::format("error-pixels {:g}{}", options_.errorPixels, samples);
+    const std::string colours =
+        options_.colourError != kUsualColourError ? fmt::format(", colour-error {:g}", options_.colourError) : "";
+    return fmt::format("error-pixels {:g}{}{}", options_.errorPixels, colours, samples);
 }
 
 Result<void> SettledDrawing::startAnew() {
@@ -60,6 +62,7 @@ Result<void> SettledDrawing::startAnew() {
 
 Result<PictureCost> SettledDrawing::draw(FrameRequest request) {
     request.errorPixels = options_.errorPixels;
+    request.colourError = colourErrorIn(request.shading.mode, options_.colourError);
     VCP_TRY_ASSIGN(const auto settled, renderer_->settle(request));
     PictureCost cost{0, reader_->bytes(), settled.residentBytes, settled.coarsestLevel, settled.finestLevel};
     VCP_TRY_ASSIGN(cost.cpuMs, medianCpuMs(options_.repetitions, [&]() -> Result<void> {

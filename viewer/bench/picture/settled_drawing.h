@@ -46,12 +46,13 @@ public:
         double errorPixels = 0.5;
         uint32_t samples = 1;  ///< of a pixel: the cost is that of all of them
         int repetitions = 3;   ///< frames whose median processor time is reported
+        double colourError = kUsualColourError;
     };
 
     /// Errors: those of createPictureRenderer.
     static Result<std::unique_ptr<SettledDrawing>> create(std::filesystem::path file, const Options& options);
 
-    /// The error, and the samples where there are several.
+    /// The error, that of colours where it is not the usual one, and the samples where there are several.
     [[nodiscard]] std::string knob() const;
     [[nodiscard]] const std::string& device() const { return renderer_->device().name; }
 

@@ -39,6 +39,7 @@ public:
         request.width = uint32_t(size.x);
         request.height = uint32_t(size.y);
         request.errorPixels = errorPixels_;
+        request.colourError = kMostColourError;
         VCP_TRY_ASSIGN(const auto scene, sceneFor(request));
         const PictureRays rays = pictureRays(request);
         const auto frame = frameConstants(request, &cache_.dataset(), 1, false, errorPixels_);

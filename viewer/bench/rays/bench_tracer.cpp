@@ -76,6 +76,7 @@ public:
         request.width = uint32_t(size.x);
         request.height = uint32_t(size.y);
         request.errorPixels = knob_.errorPixels;
+        request.colourError = kMostColourError;
         request.march = knob_.march;
         VCP_TRY_ASSIGN(const auto settled, renderer_->settle(request));
         residentBytes_ = settled.residentBytes;

@@ -305,8 +305,8 @@ void setEnvironment(Shading& shading, size_t number, glm::vec3 up) {
 /// Sets what is to be drawn: eye, forward, up (three numbers each), vertical field of view, width, height, error in
 /// pixels, ShadingMode, shadows, rays of ambient occlusion, background at the top and at the bottom (three each),
 /// direction towards the light in the camera's axes (right, up, back), whether there is a section, its normal (three)
-/// and offset, 0 or 1 + the number of an environment (kEnvironmentNames) in place of the light, and the axis that
-/// points up (three).
+/// and offset, 0 or 1 + the number of an environment (kEnvironmentNames) in place of the light, the axis that
+/// points up (three), and whether materials' channels are shown.
 EXPORT(vcp_look) void vcp_look(const double* from) {
     FrameRequest& request = opened.request;
     request.camera.eye = {from[0], from[1], from[2]};
@@ -317,10 +317,12 @@ EXPORT(vcp_look) void vcp_look(const double* from) {
     request.height = uint32_t(from[11]);
     request.errorPixels = from[12];
     request.shading.mode = ShadingMode(int(from[13]));
+    request.colourError = colourErrorIn(request.shading.mode, kUsualColourError);
     request.shading.shadows = from[14] != 0;
     request.shading.occlusionRays = uint32_t(from[15]);
     request.shading.backgroundTop = {from[16], from[17], from[18]};
     request.shading.backgroundBottom = {from[19], from[20], from[21]};
+    request.shading.channels = from[34] != 0;
     request.shading.lightDirection = {from[22], from[23], from[24]};
     setEnvironment(request.shading, size_t(from[30]), {from[31], from[32], from[33]});
     request.sections.clear();
@@ -330,15 +332,16 @@ EXPORT(vcp_look) void vcp_look(const double* from) {
 
 /// Takes in pages that have come. Returns bits: 1 a picture can be drawn, 2 settled, 4 awaits rays, 8 the cut changed.
 /// vcp_numbers() are then: error in pixels, bytes resident, pages missing, pages in the cut, failures, 1 where the
-/// budget limits, and the number of problems, of which vcp_error() is the first.
+/// budget limits, the number of problems, of which vcp_error() is the first, and the pixels of the widest slabs whose
+/// colours are off.
 EXPORT(vcp_update) int vcp_update() {
     const auto updated = update();
     if (!updated) return fail(updated.error());
     const UpdateResult& now = *updated;
     if (!now.problems.empty()) opened.error = now.problems.front().line();
     const double numbers[] = {
-        now.errorPixels,      double(now.residentBytes), double(now.pagesMissing),   double(now.pagesInCut),
-        double(now.failures), now.relaxed ? 1.0 : 0.0,   double(now.problems.size())};
+        now.errorPixels,      double(now.residentBytes), double(now.pagesMissing),    double(now.pagesInCut),
+        double(now.failures), now.relaxed ? 1.0 : 0.0,   double(now.problems.size()), now.colourPixels};
     std::copy(std::begin(numbers), std::end(numbers), opened.numbers);
     return int(now.drawable) + 2 * int(now.settled) + 4 * int(now.awaitsRays) + 8 * int(now.changed);
 }

@@ -55,6 +55,8 @@ class Look(TypedDict):
     sections: List[List[float]]
     section_caps: Caps
     samples: int
+    colour_error: float
+    plain: bool
 
 class Pick(TypedDict):
     position: Triple
@@ -81,6 +83,8 @@ class Stats(TypedDict):
     pages_drawn: int
     device_losses: int
     processor_rays: bool
+    colour_limits: bool
+    colour_pixels: float
 
 class Dataset(TypedDict):
     triangles: int
@@ -127,7 +131,8 @@ class View:
     def set_look(self, *, shading: str = ..., error_pixels: float = ..., shadows: bool = ..., occlusion_rays: int = ...,
                  occlusion_radius: float = ..., light: Point = ..., light_in_world: bool = ..., transparent: bool = ...,
                  background_top: Point = ..., background_bottom: Point = ..., sections: Sequence[Plane] = ...,
-                 section_caps: Caps = ..., samples: int = ...) -> None: ...
+                 section_caps: Caps = ..., samples: int = ..., colour_error: float = ...,
+                 plain: bool = ...) -> None: ...
     def set_light(self, direction: Point, in_world: bool = False) -> None: ...
     def set_sections(self, planes: Sequence[Plane], caps: Caps = False) -> None: ...
     def set_lines(self, lines: Sequence[Line]) -> None: ...

@@ -1,8 +1,10 @@
-#include "builder/measure/colour_difference.h"
+#include "builder/stream/colour_difference.h"
 
 #include <cmath>
 
 #include <glm/geometric.hpp>
+
+#include "builder/stream/colour_encoding.h"
 
 namespace vcp {
 
@@ -13,6 +15,11 @@ glm::dvec3 okLabOf(glm::dvec3 light) {
     return {0.2104542553 * l + 0.7936177850 * m - 0.0040720468 * s,
             1.9779984951 * l - 2.4285922050 * m + 0.4505937099 * s,
             0.0259040371 * l + 0.7827717662 * m - 0.8086757660 * s};
+}
+
+glm::dvec3 okLabOfStored(Rgba8 colour) {
+    const auto& light = lightOfByte();
+    return okLabOf({light[colour & 255u], light[colour >> 8 & 255u], light[colour >> 16 & 255u]});
 }
 
 double colourDifference(glm::dvec3 light, glm::dvec3 other) {
