@@ -6,6 +6,7 @@
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
 
+#include "mesostructure/harmonics.h"
 #include "mesostructure/march_arrays.h"
 #include "render/shared/meso_view.h"
 

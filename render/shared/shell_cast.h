@@ -16,6 +16,7 @@ vec3 cutNormal;
 
 #include "render/shared/meso_far.h"
 #include "render/shared/meso_texture_lookup.h"
+#include "render/shared/meso_transfer.h"
 
 // Gives a normal where the method has none: that of the nearest data, or of the voxel's face.
 INLINE vec3 fallbackNormal(vec3 p, vec3 d) {
