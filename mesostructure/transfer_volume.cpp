@@ -24,7 +24,7 @@ namespace f32 {
 #define INLINE inline
 
 using uint = uint32_t;
-using glm::floor, glm::max, glm::vec3, glm::vec4;
+using glm::floor, glm::max, glm::uvec3, glm::vec3, glm::vec4;
 #include "mesostructure/shared/transfer_layout.h"
 
 namespace {
@@ -239,8 +239,7 @@ f32::Harmonics TransferReader::at(dvec3 place, dvec3 normal) const {
     dvec3 part = place / extent_;
     part.x -= std::floor(part.x), part.y -= std::floor(part.y);
     f32::TransferLookup lookup{texels_.data()};
-    return lookup.transferAt({0, uint32_t(cells_.x), uint32_t(cells_.y), uint32_t(cells_.z)}, glm::vec3(part),
-                             glm::vec3(normal));
+    return lookup.transferAt(0, glm::uvec3(cells_), glm::vec3(part), glm::vec3(normal));
 }
 
 }  // namespace vcp::meso

@@ -157,7 +157,7 @@ using Radiance = glm::dvec3 (*)(glm::dvec3 direction);
 /// Returns what is seen in surroundings that need no file; nothing for other names.
 Radiance radianceNamed(std::string_view name) {
     constexpr Radiance kAll[] = {studioAt, overcastAt, clearAt};
-    const auto found = std::ranges::find(kEnvironmentNames, name);
+    const auto found = std::find(kEnvironmentNames.begin(), kEnvironmentNames.end(), name);
     return found != kEnvironmentNames.end() ? kAll[found - kEnvironmentNames.begin()] : nullptr;
 }
 

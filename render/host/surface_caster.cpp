@@ -49,7 +49,7 @@ bool SurfaceCaster::castPixel(glm::ivec2 pixel, MesoHit& hit, uint32_t& iteratio
     const float width = cast.pixelWidth(found.t);
     const ShellLook look = cast.lookOf(found, eye + found.t * d, d, width, n);
     uint32_t arrives = 0;
-    if (cast.view.transfer.up != 0 && cast.view.hasEnvironment != 0 && !found.far)
+    if (cast.view.transfer.up != 0 && cast.view.hasEnvironment != 0 && !found.far && !found.cut)
         arrives = f32::packedLight(cast.transferredLight(found, eye + found.t * d, n));
     if (glm::dot(n, d) > 0) n -= glm::dot(n, d) * d;
     hit = {.depth = kept.first + found.t,

@@ -20,6 +20,7 @@ layout(local_size_x = 8, local_size_y = 8) in;
 uint fetchHit(uint i) { return hits[i]; }
 #include "render/shaders/hit_records.glsl"
 #include "mesostructure/shared/harmonics.h"
+#include "mesostructure/shared/transfer_lookup.h"
 #include "render/shared/shell_cast.h"
 #include "render/shared/hit_light.h"
 #include "render/shaders/meso_scene.glsl"
@@ -107,7 +108,7 @@ void main() {
     vec3 n = normalize(hit.normal);
     ShellLook look = lookOf(hit, eye + hit.t * d, d, pixelWidth(hit.t), n);
     if (kTransfer != 0u) {
-        bool isRead = kTransfer == kMesoTransferRead && !hit.far;
+        bool isRead = kTransfer == kMesoTransferRead && !hit.far && !hit.cut;
         hits[kMesoPlaneTransfer * plane + index] = isRead ? packedLight(transferredLight(hit, eye + hit.t * d, n)) : 0u;
     }
     if (dot(n, d) > 0.0) n -= dot(n, d) * d;

@@ -38,6 +38,12 @@ struct MesoImage {
     uint width, height, levels;
 };
 
+// Where a volume of transfer lies among a surface's looks.
+struct MesoTransfer {
+    uint first;             // texel
+    uint across, back, up;  // cells along x, y, z; 0: there is none
+};
+
 // A picture of one surface, in the space of its shell.
 struct MesoView {
     vec4 eye, eyeX, eyeY;              // ray of the pixel x, y: origin

@@ -1,6 +1,5 @@
 // Light from everywhere on a hit whose surface has a volume of transfer (mesostructure/transfer_volume.h). Compiles as
-// shell_cast.h does, which includes it.
-#include "mesostructure/shared/transfer_lookup.h"
+// shell_cast.h does, which includes it; mesostructure/shared/transfer_lookup.h is before both.
 
 // Returns what a white surface gives back at a hit. `n`: its unit normal in the world.
 INLINE vec3 transferredLight(ShellHit hit, vec3 p, vec3 n) {
@@ -12,7 +11,8 @@ INLINE vec3 transferredLight(ShellHit hit, vec3 p, vec3 n) {
     part.x -= floor(part.x);
     part.y -= floor(part.y);
     mat3 frame = tileFrame(gradients);
-    Harmonics arrives = turnedHarmonics(transferAt(view.transfer, part, n * frame), frame);
+    MesoTransfer of = view.transfer;
+    Harmonics arrives = turnedHarmonics(transferAt(of.first, uvec3(of.across, of.back, of.up), part, n * frame), frame);
     vec3 light = vec3(0.0f);
     for (int i = 0; i < 16; i++) light += arrives.c[i] * vec3(view.harmonics[i]);
     return max(light, vec3(0.0f));

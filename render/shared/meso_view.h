@@ -13,7 +13,6 @@ using uint = uint32_t;
 using vec3 = glm::vec3;
 using vec4 = glm::vec4;
 
-#include "mesostructure/shared/transfer_layout.h"
 #include "render/shared/meso_layout.h"
 
 static_assert(sizeof(MesoView) == 784 && offsetof(MesoView, width) == 96);
