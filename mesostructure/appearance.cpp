@@ -7,6 +7,8 @@
 
 #include <glm/geometric.hpp>
 
+#include "mesostructure/tile_paths.h"
+
 namespace vcp::meso {
 
 namespace {
@@ -39,20 +41,6 @@ dvec3 viewOf(uint32_t i, uint32_t j) {
                  x = (u + v) / 2, y = (u - v) / 2;
     const dvec3 d = glm::normalize(dvec3(x, y, 1 - std::abs(x) - std::abs(y)));
     return glm::normalize(dvec3(d.x, d.y, std::max(d.z, std::sin(pi / 60))));
-}
-
-/// Returns the i-th point of a sequence that fills the unit square evenly (Roberts 2018).
-dvec2 spread(uint64_t i) {
-    const dvec2 p = 0.5 + double(i) * dvec2(0.7548776662466927, 0.5698402909980532);
-    return p - glm::floor(p);
-}
-
-/// Turns a point of the square to a direction about n, distributed by the cosine (Duff et al. 2017).
-dvec3 byCosine(dvec3 n, dvec2 p) {
-    const double sign = n.z >= 0 ? 1 : -1, a = -1 / (sign + n.z), b = n.x * n.y * a, r = std::sqrt(p.x),
-                 turn = 2 * pi * p.y;
-    const dvec3 x(1 + sign * n.x * n.x * a, sign * b, -sign * n.x), y(b, sign + n.y * n.y * a, -n.y);
-    return glm::normalize(x * (r * std::cos(turn)) + y * (r * std::sin(turn)) + n * std::sqrt(std::max(0.0, 1 - p.x)));
 }
 
 class Caster {
@@ -102,7 +90,7 @@ struct Sums {
             plain[size_t(i)] += cosineBand(i) * at[size_t(i)], shadowed[size_t(i)] += cosineBand(i) * at[size_t(i)];
         // The light that shadows take is summed: it is less than what is left, so its noise is less.
         for (int k = 0; k < kShadowRays; ++k) {
-            const dvec3 light = byCosine(seen.normal, spread(number * kShadowRays + uint64_t(k)));
+            const dvec3 light = directionByCosine(seen.normal, evenPoint(number * kShadowRays + uint64_t(k)));
             if (caster.isLit(seen, light)) continue;
             const Harmonics lost = harmonicsOf(light);
             for (size_t i = 0; i < 9; ++i) shadowed[i] -= pi / kShadowRays * lost[i];
@@ -129,11 +117,11 @@ Appearance appearanceOf(const Shape& shape, double heightScale, uint32_t rays) {
     for (uint32_t j = 0; j < Appearance::kViews; ++j)
         for (uint32_t i = 0; i < Appearance::kViews; ++i) {
             Sums sums;
-            for (uint64_t ray = 0; ray < rays; ++ray) sums.add(caster, caster.see(viewOf(i, j), spread(ray)), ray);
+            for (uint64_t ray = 0; ray < rays; ++ray) sums.add(caster, caster.see(viewOf(i, j), evenPoint(ray)), ray);
             sums.append(made.texels);
             made.isOpaque = made.isOpaque && sums.bottoms == 0;
         }
-    for (uint64_t ray = 0; ray < rays; ++ray) made.height += caster.see({0, 0, 1}, spread(ray)).at.z / rays;
+    for (uint64_t ray = 0; ray < rays; ++ray) made.height += caster.see({0, 0, 1}, evenPoint(ray)).at.z / rays;
     return made;
 }
 

@@ -140,6 +140,34 @@ void readGuesses(In& in, SafeFactors& f) {
     for (size_t row = 0; row < f.rowCount(); ++row) in.require(f.rows[4 * row + 3] >> 16 < uint32_t(f.clusters));
 }
 
+constexpr uint32_t kTransferVersion = 1;
+
+void writeTransfer(const TransferVolume& volume, Out& o) {
+    o.grid(volume.grid), o.one(volume.albedo), o.one(volume.paths), o.one(uint32_t(volume.cells())),
+        o.one(kTransferVersion), o.all(volume.numbers), o.all(volume.terms);
+}
+
+/// Whether 16 bits are a number.
+bool isFiniteHalf(uint64_t bits) { return (bits & 0x7c00) != 0x7c00; }
+
+std::shared_ptr<const TransferVolume> readTransfer(In& in, glm::dvec3 extent) {
+    auto volume = std::make_shared<TransferVolume>();
+    volume->grid = in.grid(extent), volume->albedo = in.one<float>(), volume->paths = in.one<uint32_t>();
+    const auto cells = in.one<uint32_t>(), version = in.one<uint32_t>();
+    in.require(volume->albedo >= 0 && volume->albedo <= 1 && version == kTransferVersion);
+    in.require(cells <= TransferVolume::kMostCells);
+    if (!in.ok()) return nullptr;
+    volume->numbers = in.all<uint32_t>(volume->grid.count());
+    volume->terms = in.all<uint64_t>(cells * TransferVolume::kTexels);
+    uint32_t last = 0;
+    for (const uint32_t number : volume->numbers)
+        if (number != 0) in.require(number == ++last);
+    in.require(last == cells);
+    for (const uint64_t texel : volume->terms)
+        for (int i = 0; i < 64; i += 16) in.require(isFiniteHalf(texel >> i));
+    return volume;
+}
+
 std::vector<std::pair<ChunkKind, Bytes>> chunksOf(const Asset& a) {
     std::vector<std::pair<ChunkKind, Bytes>> chunks;
     const auto add = [&](ChunkKind kind, const auto& write) {
@@ -180,6 +208,7 @@ std::vector<std::pair<ChunkKind, Bytes>> chunksOf(const Asset& a) {
             o.one(f.cells), o.one(f.azimuths), o.one(f.elevations), o.one(f.quads), o.one(f.clusters), o.one(f.unit),
                 o.one(f.product), o.all(f.rows), o.all(f.columns);
         });
+    if (a.transfer) add(ChunkKind::Transfer, [&](Out& o) { writeTransfer(*a.transfer, o); });
     return chunks;
 }
 
@@ -282,6 +311,9 @@ bool readChunk(ChunkKind kind, In& in, Asset& a) {
         case ChunkKind::Guesses:
             readGuesses(in, a.guesses.emplace());
             break;
+        case ChunkKind::Transfer:
+            a.transfer = readTransfer(in, extent);
+            break;
         default:
             return false;
     }
@@ -371,6 +403,10 @@ Result<void> buildAsset(Asset& asset, const AssetOptions& options) {
         VCP_TRY_ASSIGN(auto properties, sampleProperties(*shape, options.gdm->traced.points));
         VCP_TRY_ASSIGN(asset.gdm, packMap(std::move(table), options.gdm->rank, options.gdm->bits,
                                           options.gdm->withVisibility, std::move(properties)));
+    }
+    if (options.transfer) {
+        VCP_TRY_ASSIGN(auto transfer, traceTransfer(*shape, *options.transfer));
+        asset.transfer = std::make_shared<const TransferVolume>(std::move(transfer));
     }
     if (!options.withPatches) return {};
     VCP_TRY_ASSIGN(asset.patches, buildPatches(*shape, *asset.occupancy, options.crossings));
@@ -490,7 +526,7 @@ Result<Asset> parseAsset(std::span<const std::byte> bytes, const std::string& na
         if (hashBytes(content) != chunk.hash)
             return fail("chunk", chunk.offset, "hash does not match: the file was changed or damaged");
         const auto kind = uint32_t(chunk.kind);
-        if (kind >= 64 || kind == 0 || kind > uint32_t(ChunkKind::Guesses))
+        if (kind >= 64 || kind == 0 || kind > uint32_t(ChunkKind::Transfer))
             return Error{.code = ErrorCode::Unsupported,
                          .message = fmt::format("chunk kind {} is not known: use a newer program", kind),
                          .file = name,

@@ -14,11 +14,13 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "mesostructure/march.h"
+#include "mesostructure/transfer_volume.h"
 #include "octree/io/output_file.h"
 
 namespace vcp::meso {
@@ -41,6 +43,9 @@ enum class ChunkKind : uint32_t {
     Displacement = 10,
     /// SafeFactors: grid, i32 azimuths, elevations, quads, clusters, f32 unit, product, u32 rows, columns
     Guesses = 11,
+    /// TransferVolume: grid, f32 albedo, u32 paths a cell, u32 number of the last cell, u32 version (1); u32 numbers,
+    /// terms of 4 x u16
+    Transfer = 12,
 };
 
 struct AssetHeader {
@@ -93,6 +98,7 @@ struct Asset {
     std::optional<PatchSet> patches;
     std::optional<GdmMap> gdm;
     std::optional<SafeFactors> guesses;
+    std::shared_ptr<const TransferVolume> transfer;  ///< null: none
 };
 
 /// Returns the asset's shape, which refers to the asset. Errors: as the shapes'.
@@ -116,6 +122,7 @@ struct AssetOptions {
         bool withVisibility = true;
     };
     std::optional<Displacement> gdm = std::nullopt;
+    std::optional<TransferOptions> transfer = std::nullopt;
 };
 
 /// Returns cells that suit an asset, where `asked` is 0.

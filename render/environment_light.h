@@ -6,6 +6,7 @@
 #pragma once
 
 #include <array>
+#include <functional>
 #include <optional>
 #include <span>
 #include <string_view>
@@ -22,6 +23,8 @@ struct EnvironmentLight {
     /// Red, green and blue light on a surface with the normal n: (n, 1) m (n, 1), where that is not below 0. Symmetric;
     /// z points up, and the picture's middle lies at +y. It is a part of the light that a white surface gives back.
     std::array<glm::mat4, 3> forms{};
+    /// Red, green and blue radiance in the same unit, as coefficients of meso::f32::harmonicsOf, in the same axes.
+    std::array<glm::vec3, 16> harmonics{};
     glm::vec3 up{0, 1, 0};  ///< of the surroundings, in world axes, unit
     float turn = 0;         ///< degrees that they are turned about it, to the left as seen from above
     float strength = 1;     ///< times that light, at least 0
@@ -45,5 +48,12 @@ std::optional<EnvironmentLight> environmentNamed(std::string_view name);
 /// Returns the light as FrameConstants::environment has it, times its strength, for normals in a dataset's axes.
 std::array<glm::vec4, 9> environmentRows(const EnvironmentLight& light,
                                          const glm::dquat& worldFromDataset = {1, 0, 0, 0});
+
+/// Returns the radiance as MesoView::harmonics has it, times its strength, in the world's axes.
+std::array<glm::vec4, 16> environmentHarmonics(const EnvironmentLight& light);
+
+/// Returns what is seen in surroundings that need no file: radiance by direction in their own axes, in the unit of
+/// their light. Precondition: one of kEnvironmentNames.
+std::function<glm::dvec3(glm::dvec3)> environmentRadiance(std::string_view name);
 
 }  // namespace vcp

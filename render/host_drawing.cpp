@@ -123,12 +123,12 @@ Result<void> checkHostDraws(const FrameRequest& request) {
 
 Result<std::vector<PreparedSurface>> prepareOnHost(std::span<const MesoSurface> surfaces) {
     using Words = std::shared_ptr<const std::vector<uint64_t>>;
-    std::map<std::tuple<const meso::Appearance*, const MesoTexture*, const MesoTexture*>, Words> known;
+    std::map<LookKey, Words> known;
     std::vector<PreparedSurface> prepared;
     for (const MesoSurface& surface : surfaces) {
         if (!surface.arrays) return unsupported("remeshed surfaces");
         MesoLook look = mesoLook(surface);
-        Words& words = known[{surface.far.get(), surface.colours.get(), surface.normals.get()}];
+        Words& words = known[lookKey(surface)];
         if (!words) words = std::make_shared<const std::vector<uint64_t>>(std::move(look.looks));
         look.looks.clear();
         prepared.push_back({&surface, std::move(look), words});

@@ -39,6 +39,12 @@ MesoLook mesoLook(const MesoSurface& surface) {
     };
     add(surface.colours.get(), look.view.colours, frame::kMesoColours);
     add(surface.normals.get(), look.view.normals, frame::kMesoNormals);
+    if (surface.transfer) {
+        const glm::uvec3 cells(surface.transfer->grid.cells);
+        look.view.transfer = {uint32_t(look.looks.size()), cells.x, cells.y, cells.z};
+        const std::vector<uint64_t> texels = meso::transferTexels(*surface.transfer);
+        look.looks.insert(look.looks.end(), texels.begin(), texels.end());
+    }
     // A surface that rays may come through must be marched.
     look.isFarDrawn = surface.far && (surface.withBase || surface.far->isOpaque);
     look.view.meanHeight = look.isFarDrawn ? float(surface.far->height) : 0.0f;
@@ -79,9 +85,15 @@ void setPicture(frame::MesoView& view, glm::dvec3 origin, const FrameRequest& re
     if (request.shading.environment) {
         const auto rows = environmentRows(*request.shading.environment);
         std::copy(rows.begin(), rows.end(), view.environment);
+        const auto harmonics = environmentHarmonics(*request.shading.environment);
+        std::copy(harmonics.begin(), harmonics.end(), view.harmonics);
     }
     view.strayPixels = float(request.errorPixels), view.farShadows = request.shading.shadows ? 1 : 0;
     view.shows = shownIn(request.shading.mode);
+}
+
+bool readsTransfer(const Shading& shading) {
+    return shading.environment && shownIn(shading.mode) == frame::kMesoShowLit;
 }
 
 bool hasMesoShadows(const Shading& shading) {

@@ -9,6 +9,7 @@
 #include "mesostructure/march_arrays.h"
 #include "mesostructure/remesh/remesher.h"
 #include "mesostructure/shell.h"
+#include "mesostructure/transfer_volume.h"
 #include "render/meso_texture.h"
 
 namespace vcp {
@@ -32,6 +33,8 @@ struct MesoSurface {
     /// A texture of unit vectors that bend the mesostructure's shading normals: x and y are along the tile, z points
     /// out of the mesostructure.
     std::shared_ptr<const MesoTexture> normals;
+    /// What its walls do to light from everywhere; null: such light falls on it as if it were open.
+    std::shared_ptr<const meso::TransferVolume> transfer;
     std::shared_ptr<const meso::Appearance> far;  ///< what it looks like from far; null: it is marched from everywhere
 };
 

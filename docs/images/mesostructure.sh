@@ -33,6 +33,15 @@ torus='"asset": "hemispheres", "surface": "torus", "tiles": 80, "height": 0.6, '
 draw far_marched "{$torus, \"far\": false}" --shadows --size 360x220 --camera 30,35,1.2
 draw far "{$torus}" --shadows --size 360x220 --camera 30,35,1.2
 
+# Beads in the light of a studio: as if nothing stood beside them, and with what they do to it.
+"$build/vcp" meso build beads -o "$scratch/beads.meso" --transfer 48 --albedo 0.7 --progress none
+for way in open transfer; do
+    keys=
+    if [ $way = transfer ]; then keys='"transfer": true, '; fi
+    rest='"environment": {"source": "studio"}' \
+        draw light_$way '{"asset": "beads.meso", "tiles": 2, '"$keys$clay}" --size 360x270 --camera 30,35,1.6
+done
+
 # Beads on a dog of 40 000 triangles.
 "$build/make_scan" --shape dog --triangles 40k -o "$scratch/dog.obj"
 cp "$images/../scenes/beads_dog.json" "$scratch"

@@ -44,19 +44,21 @@ struct FarLook {
 
 /// What is kept of each pixel beside the picture's depth, normal and hit; lengths are world units.
 struct LitPlanes {
-    LitPlanes(size_t pixels, bool hasFar, bool hasChannels)
+    LitPlanes(size_t pixels, bool hasFar, bool hasTransfer, bool hasChannels)
         : albedo(pixels),
           lift(pixels),
           edge(pixels),
           sun(pixels),
           sky(pixels),
           far(hasFar ? pixels : 0),
+          arrives(hasTransfer ? pixels : 0),
           channels(hasChannels ? pixels : 0) {}
 
     std::vector<glm::vec3> albedo;
     std::vector<float> lift, edge;  // by which rays of light begin above the hit; of the pixel there
     std::vector<uint8_t> sun, sky;
     std::vector<FarLook> far;                          // empty where no surface is seen from far
+    std::vector<uint32_t> arrives;                     // MesoHit::arrives; empty where no surface has transfer
     std::vector<std::optional<HitChannels>> channels;  // in the world's axes; empty where no layer shows any
 };
 
@@ -72,6 +74,10 @@ struct LitTile {
     size_t count = 0;
 };
 
+bool readsTransfer(const HostSurface& surface) {
+    return surface.view.transfer.up != 0 && surface.view.hasEnvironment != 0;
+}
+
 class LitDrawing {
 public:
     LitDrawing(const LitScene& scene, HostPicture& picture)
@@ -80,6 +86,7 @@ public:
           lit_(litLayers(scene, picture.size)),
           planes_(picture.colours.size(),
                   std::any_of(scene.surfaces.begin(), scene.surfaces.end(), std::mem_fn(&HostSurface::isFarDrawn)),
+                  std::any_of(scene.surfaces.begin(), scene.surfaces.end(), readsTransfer),
                   std::any_of(lit_.begin(), lit_.end(), [](const auto& each) { return each->tiles.hasChannels(); })),
           frame_(scene.frame),
           reach_(scene.occlusionReach) {
@@ -172,6 +179,7 @@ private:
             planes_.lift[to] = caster.surface().view.shadowLift;
             planes_.edge[to] = hit.width;
             if (!planes_.far.empty()) planes_.far[to] = {hit.isFar, hit.sky, hit.light};
+            if (!planes_.arrives.empty()) planes_.arrives[to] = hit.arrives;
             if (!planes_.channels.empty()) planes_.channels[to].reset();
         });
     }
@@ -300,8 +308,11 @@ private:
         for (size_t k = 0; k < tile.count; ++k) {
             const size_t to = tile.pixels[k].at;
             const bool isLit = frame_.shadingMode != frame::kShadeNormals && frame_.shadingMode != frame::kShadeUnlit;
-            picture_.colours[to] =
-                isLit && isFar(to) ? farColour(to, tile.pixels[k].normal, surface.sky[k]) : colours[k];
+            const LitTile::Pixel& pixel = tile.pixels[k];
+            picture_.colours[to] = !isLit                              ? colours[k]
+                                   : isFar(to)                         ? farColour(to, pixel.normal, surface.sky[k])
+                                   : pixel.onSurface && hasArrived(to) ? transferColour(to, pixel.normal)
+                                                                       : colours[k];
         }
     }
 
@@ -316,6 +327,22 @@ private:
             frame_.hasEnvironment != 0
                 ? f32::lightInEnvironment(f32::environmentLight(normal, frame_.environment), sun, skySeen)
                 : glm::vec3(f32::lightUnderSky(far.sky, sun, skySeen));
+        return packedColour(glm::vec4(planes_.albedo[pixel] * light, 1));
+    }
+
+    [[nodiscard]] bool hasArrived(size_t pixel) const {
+        return !planes_.arrives.empty() && planes_.arrives[pixel] != 0;
+    }
+
+    /// Returns the colour of a hit that knows what comes from everywhere; occlusion is part of that.
+    [[nodiscard]] uint32_t transferColour(size_t pixel, glm::vec3 normal) const {
+        float sun = 0;
+        for (uint32_t i = 0; i < frame_.lightCount; ++i)
+            if ((planes_.sun[pixel] & bitsOfLight(frame_, i)) != 0) {
+                const glm::vec4 from = lightNumbered(frame_, i);
+                sun += from.w * f32::sunlightOf(normal, glm::vec3(from), 1.0f);
+            }
+        const glm::vec3 light = f32::lightInEnvironment(f32::unpackedLight(planes_.arrives[pixel]), sun, 1.0f);
         return packedColour(glm::vec4(planes_.albedo[pixel] * light, 1));
     }
 

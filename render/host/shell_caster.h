@@ -6,6 +6,7 @@
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
 
+#include "mesostructure/harmonics.h"
 #include "mesostructure/march_arrays.h"
 #include "render/shared/meso_view.h"
 
@@ -13,6 +14,7 @@ namespace vcp::meso::f32::shell {
 
 using namespace vcp::frame;
 
+#include "mesostructure/shared/transfer_layout.h"
 #include "render/shared/shell_records.h"
 
 #define INLINE inline
@@ -39,6 +41,7 @@ struct ShellCast : ArrayMarch {
     [[nodiscard]] vec4 fetchInput(int i) const { return inputs[i]; }
     [[nodiscard]] vec4 fetchLook(int i) const { return unpackHalf4x16(looks[i]); }
 
+#include "mesostructure/shared/transfer_lookup.h"
 #include "render/shared/shell_cast.h"
 };
 

@@ -4,6 +4,7 @@
 
 #include <glm/geometric.hpp>
 
+#include "render/host/hit_light.h"
 #include "render/host/shell_caster.h"
 
 namespace vcp {
@@ -47,6 +48,9 @@ bool SurfaceCaster::castPixel(glm::ivec2 pixel, MesoHit& hit, uint32_t& iteratio
     glm::vec3 n = glm::normalize(found.normal);
     const float width = cast.pixelWidth(found.t);
     const ShellLook look = cast.lookOf(found, eye + found.t * d, d, width, n);
+    uint32_t arrives = 0;
+    if (cast.view.transfer.up != 0 && cast.view.hasEnvironment != 0 && !found.far && !found.cut)
+        arrives = f32::packedLight(cast.transferredLight(found, eye + found.t * d, n));
     if (glm::dot(n, d) > 0) n -= glm::dot(n, d) * d;
     hit = {.depth = kept.first + found.t,
            .normal = glm::normalize(n),
@@ -55,6 +59,7 @@ bool SurfaceCaster::castPixel(glm::ivec2 pixel, MesoHit& hit, uint32_t& iteratio
            .piece = found.piece,
            .isFar = found.far,
            .sky = look.sky / kMesoMostSky,
+           .arrives = arrives,
            .light = look.light};
     return true;
 }

@@ -29,12 +29,13 @@ struct HostSurface {
 struct MesoHit {
     float depth = 0;  ///< along the unit ray
     glm::vec3 normal{0};
-    glm::vec3 colour{0};  ///< encoded for the screen
-    float width = 0;      ///< of the pixel there
-    int piece = 0;        ///< of the shell: the first of its texels
-    bool isFar = false;   ///< not marched: it stands for many points
-    float sky = 1;        ///< of a far hit: the part of the sky that its points face
-    glm::vec4 light{1};   ///< of a far hit: what each light gives, at strength 1
+    glm::vec3 colour{0};   ///< encoded for the screen
+    float width = 0;       ///< of the pixel there
+    int piece = 0;         ///< of the shell: the first of its texels
+    bool isFar = false;    ///< not marched: it stands for many points
+    float sky = 1;         ///< of a far hit: the part of the sky that its points face
+    uint32_t arrives = 0;  ///< light from everywhere by the surface's transfer (f32::packedLight); 0: none is known
+    glm::vec4 light{1};    ///< of a far hit: what each light gives, at strength 1
 };
 
 /// What was found out about rays, shadow rays too.

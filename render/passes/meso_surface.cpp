@@ -36,8 +36,7 @@ Result<void> MesoSurfacePass::setSurfaces(std::span<const MesoSurface> surfaces)
     remeshed_ = 0;
     ++version_;
     std::map<const meso::MarchArrays*, std::shared_ptr<MesoTexels>> uploaded;
-    std::map<std::tuple<const meso::Appearance*, const MesoTexture*, const MesoTexture*>, std::shared_ptr<MesoTexels>>
-        looks;
+    std::map<LookKey, std::shared_ptr<MesoTexels>> looks;
     std::vector<Placed> placed;
     for (const MesoSurface& surface : surfaces) {
         Placed made;
@@ -54,7 +53,8 @@ Result<void> MesoSurfacePass::setSurfaces(std::span<const MesoSurface> surfaces)
         }
         const MesoLook described = mesoLook(surface);
         made.view = described.view, made.textures = described.textures, made.isFarDrawn = described.isFarDrawn;
-        auto& look = looks[{surface.far.get(), surface.colours.get(), surface.normals.get()}];
+        made.hasTransfer = surface.transfer != nullptr;
+        auto& look = looks[lookKey(surface)];
         if (!look && !described.looks.empty()) {
             VCP_TRY_ASSIGN(auto uploadedLook, resources_.halfs(described.looks));
             look = std::make_shared<MesoTexels>(std::move(uploadedLook));
@@ -85,10 +85,11 @@ uint64_t MesoSurfacePass::assetBytes() const {
     return sum;
 }
 
-Result<void> MesoSurfacePass::makeTarget(MesoTarget& target, PictureSize size, const Picture& picture) {
+Result<void> MesoSurfacePass::makeTarget(MesoTarget& target, PictureSize size, uint32_t planes,
+                                         const Picture& picture) {
     // The target has no size until all of it is made.
     target = {};
-    for (const auto& [buffer, bytes] : {std::pair(&target.hits, size.pixels() * frame::kMesoPlanes * 4),
+    for (const auto& [buffer, bytes] : {std::pair(&target.hits, size.pixels() * planes * 4),
                                         std::pair(&target.counters, uint64_t{sizeof(MesoCounts)})}) {
         VCP_TRY_ASSIGN(*buffer, resources_.storage(bytes));
     }
@@ -106,7 +107,7 @@ Result<void> MesoSurfacePass::makeTarget(MesoTarget& target, PictureSize size, c
                                            &target.counters, surface.look.get(), picture.sceneLight, picture.depths}));
         target.drawings.push_back(std::move(drawing));
     }
-    target.size = size, target.surfaces = version_, target.picture = picture.colours->handle();
+    target.size = size, target.planes = planes, target.surfaces = version_, target.picture = picture.colours->handle();
     target.sceneLight = handleOf(picture.sceneLight), target.depths = picture.depths->handle();
     return {};
 }
@@ -118,6 +119,9 @@ Result<void> MesoSurfacePass::choosePipelines(const Placed& surface, MesoTarget:
     const auto choose = [&](std::span<const uint32_t> spirv, uint32_t rays, uint32_t textures) {
         std::vector<uint32_t> constants = march;
         constants.insert(constants.end(), {rays, textures, surface.isFarDrawn ? 1u : 0u, inScene ? 1u : 0u});
+        // Without the plane the pipelines are those of pictures without transfer.
+        if (rays == kPictureRays && keepsTransfer(shading))
+            constants.push_back(surface.hasTransfer ? frame::kMesoTransferRead : frame::kMesoTransferKept);
         return resources_.pipeline(spirv, constants);
     };
     if (surface.remeshed.surface) {
@@ -138,9 +142,11 @@ Result<void> MesoSurfacePass::choosePipelines(const Placed& surface, MesoTarget:
 
 Result<void> MesoSurfacePass::prepare(MesoTarget& target, const Picture& picture, const FrameRequest& request) {
     const PictureSize size = sizeOf(request);
-    if (!(size == target.size) || target.surfaces != version_ || target.picture != picture.colours->handle() ||
-        target.sceneLight != handleOf(picture.sceneLight) || target.depths != picture.depths->handle())
-        VCP_TRY(makeTarget(target, size, picture));
+    const uint32_t planes = frame::kMesoPlanes + (keepsTransfer(request.shading) ? 1 : 0);
+    if (!(size == target.size) || planes != target.planes || target.surfaces != version_ ||
+        target.picture != picture.colours->handle() || target.sceneLight != handleOf(picture.sceneLight) ||
+        target.depths != picture.depths->handle())
+        VCP_TRY(makeTarget(target, size, planes, picture));
     const bool inScene = picture.sceneLight != nullptr;
     for (size_t i = 0; i < surfaces_.size(); ++i) {
         const Placed& surface = surfaces_[i];
@@ -148,8 +154,14 @@ Result<void> MesoSurfacePass::prepare(MesoTarget& target, const Picture& picture
         if (surface.remeshed.surface)
             VCP_TRY(raster_.remesh(target.remeshed, surface.number, surface.remeshed, remeshLook(request)));
     }
-    VCP_TRY_ASSIGN(target.shade, resources_.pipeline(kMesoShadeSpirv, {0, 0, 0, 0, 0, 0, 0, inScene ? 1u : 0u}));
+    std::vector<uint32_t> shade{0, 0, 0, 0, 0, 0, 0, inScene ? 1u : 0u};
+    if (planes > frame::kMesoPlanes) shade.push_back(frame::kMesoTransferKept);
+    VCP_TRY_ASSIGN(target.shade, resources_.pipeline(kMesoShadeSpirv, shade));
     return {};
+}
+
+bool MesoSurfacePass::keepsTransfer(const Shading& shading) const {
+    return readsTransfer(shading) && std::ranges::any_of(surfaces_, &Placed::hasTransfer);
 }
 
 MesoConstants MesoSurfacePass::constantsOf(size_t number, const FrameRequest& request) const {
@@ -185,7 +197,7 @@ void MesoSurfacePass::recordHits(VkCommandBuffer commands, const MesoTarget& tar
     const uint64_t plane = target.size.pixels() * 4;
     const VkBufferCopy region{0, 0, plane};
     vkCmdCopyBuffer(commands, picture.depths->handle(), target.hits.handle(), 1, &region);
-    vkCmdFillBuffer(commands, target.hits.handle(), plane, (frame::kMesoPlanes - 1) * plane, 0);
+    vkCmdFillBuffer(commands, target.hits.handle(), plane, (target.planes - 1) * plane, 0);
     vkCmdFillBuffer(commands, target.counters.handle(), 0, VK_WHOLE_SIZE, 0);
     for (size_t i = 0; i < surfaces_.size(); ++i) {
         const MesoConstants constants = constantsOf(i, request);

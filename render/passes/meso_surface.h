@@ -48,6 +48,7 @@ struct MesoTarget {
     uint64_t surfaces = 0;  ///< MesoSurfacePass::version() for which the sets were made
     Buffer hits, counters;
     Buffer reported;                       ///< MesoReport
+    uint32_t planes = 0;                   ///< of the hits
     VkBuffer picture = VK_NULL_HANDLE;     ///< not owned; in the sets
     VkBuffer sceneLight = VK_NULL_HANDLE;  ///< the same; null where surfaces and datasets do not shade each other
     VkBuffer depths = VK_NULL_HANDLE;      ///< the same
@@ -100,9 +101,11 @@ private:
         glm::dvec3 origin;
         frame::MesoView view{};  ///< what does not depend on the picture
         uint32_t textures = 0;
-        bool isFarDrawn = false;
+        bool isFarDrawn = false, hasTransfer = false;
     };
-    Result<void> makeTarget(MesoTarget& target, PictureSize size, const Picture& picture);
+    /// Whether a picture has a plane of the light that comes through volumes of transfer.
+    [[nodiscard]] bool keepsTransfer(const Shading& shading) const;
+    Result<void> makeTarget(MesoTarget& target, PictureSize size, uint32_t planes, const Picture& picture);
     Result<void> choosePipelines(const Placed& surface, MesoTarget::Drawing& drawing, const Shading& shading,
                                  bool inScene);
     MesoConstants constantsOf(size_t number, const FrameRequest& request) const;

@@ -7,9 +7,11 @@
 #define Real2 vec2
 #define Real3 vec3
 #define Real4 vec4
+#define Real3x3 mat3
 #define REAL_EPSILON 1.1920929e-7
 #include "mesostructure/shared/march_layout.h"
 #include "mesostructure/shared/shell_layout.h"
+#include "mesostructure/shared/transfer_layout.h"
 #include "render/shared/meso_layout.h"
 #include "render/shared/shell_records.h"
 

@@ -4,6 +4,7 @@
 #include "render/shaders/meso_bindings.glsl"
 
 layout(constant_id = 7) const uint kScene = 0u;  // 1: surfaces and datasets shade each other
+layout(constant_id = 8) const uint kTransfer = 0u;
 layout(local_size_x = 8, local_size_y = 8) in;
 
 uint fetchHit(uint i) { return hits[i]; }
@@ -42,7 +43,8 @@ void main() {
             if (ray.occlusionRays > 0u)
                 skySeen = sceneSkyAbout(pixel, uvec2(view.width, view.height), depth, 8.0 * widthAt(pixel, depth));
         }
-        result *= mesoLight(n, look.w, light, skySeen);
+        uint arrives = kTransfer != 0u ? hits[kMesoPlaneTransfer * plane + index] : 0u;
+        result *= mesoLight(n, look.w, light, skySeen, arrives);
     }
     picturePixels[index] = packUnorm4x8(vec4(result, 1.0));
 }

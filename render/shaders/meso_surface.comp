@@ -14,10 +14,13 @@ const uint kShadow = kRays == 1u || kRays == 2u ? 1u : 0u;
 layout(constant_id = 5) const uint kTextures = 0u;  // kMesoColours, kMesoNormals
 layout(constant_id = 6) const uint kFromFar = 0u;  // 1: slabs that are less high than a part of a pixel are not marched
 layout(constant_id = 7) const uint kScene = 0u;    // 1: surfaces and datasets shade each other
+layout(constant_id = 8) const uint kTransfer = 0u;  // kMesoTransferKept, kMesoTransferRead
 layout(local_size_x = 8, local_size_y = 8) in;
 
 uint fetchHit(uint i) { return hits[i]; }
 #include "render/shaders/hit_records.glsl"
+#include "mesostructure/shared/harmonics.h"
+#include "mesostructure/shared/transfer_lookup.h"
 #include "render/shared/shell_cast.h"
 #include "render/shared/hit_light.h"
 #include "render/shaders/meso_scene.glsl"
@@ -104,6 +107,10 @@ void main() {
     if (hit.far) atomicAdd(counters[1], 1u);
     vec3 n = normalize(hit.normal);
     ShellLook look = lookOf(hit, eye + hit.t * d, d, pixelWidth(hit.t), n);
+    if (kTransfer != 0u) {
+        bool isRead = kTransfer == kMesoTransferRead && !hit.far && !hit.cut;
+        hits[kMesoPlaneTransfer * plane + index] = isRead ? packedLight(transferredLight(hit, eye + hit.t * d, n)) : 0u;
+    }
     if (dot(n, d) > 0.0) n -= dot(n, d) * d;
     uint code = max(packHitNormal(normalize(n)), 1u);  // 0 means that a pixel has no mesostructure
     hits[kMesoPlaneDepth * plane + index] = floatBitsToUint(kept.first + hit.t);

@@ -5,6 +5,7 @@
 
 layout(constant_id = 5) const uint kTextures = 0u;  // kMesoColours
 layout(constant_id = 7) const uint kScene = 0u;     // 1: surfaces and datasets shade each other
+layout(constant_id = 8) const uint kTransfer = 0u;
 layout(local_size_x = 8, local_size_y = 8) in;
 
 uint fetchHit(uint i) { return hits[i]; }
@@ -28,6 +29,7 @@ void main() {
     hits[kMesoPlaneLook * plane + index] = packUnorm4x8(look);
     hits[kMesoPlaneLight * plane + index] = ~0u;  // before shadows, all of each light arrives
     hits[kMesoPlaneIterations * plane + index] += 1u;
+    if (kTransfer != 0u) hits[kMesoPlaneTransfer * plane + index] = 0u;
     if (kScene == 0u) return;
     // Triangles are as large as pixels: rays of light begin half a pixel above them.
     keepInScene(index, hit.x, code, max(view.shadowLift, 0.5 * widthAt(pixel, hit.x)), false);

@@ -16,6 +16,9 @@ const float kMesoNoHit = 1e30f;  // from here on, a depth is none
 const uint kMesoPlaneDepth = 0u, kMesoPlaneNormal = 1u, kMesoPlaneLook = 2u, kMesoPlaneIterations = 3u,
            kMesoPlaneLight = 4u;
 const uint kMesoPlanes = 5u;
+// One more, where surfaces have transfer: the light from everywhere that a hit gets (packedLight; 0: none is known).
+const uint kMesoPlaneTransfer = 5u;
+const uint kMesoTransferKept = 1u, kMesoTransferRead = 2u;  // kTransfer: the plane is there; the surface fills it
 
 const uint kMesoMaxSections = 6u;
 const uint kMesoMaxLights = 4u;
@@ -33,6 +36,12 @@ struct MesoLightRay {
 struct MesoImage {
     uint first;  // texel
     uint width, height, levels;
+};
+
+// Where a volume of transfer lies among a surface's looks.
+struct MesoTransfer {
+    uint first;             // texel
+    uint across, back, up;  // cells along x, y, z; 0: there is none
 };
 
 // A picture of one surface, in the space of its shell.
@@ -57,4 +66,6 @@ struct MesoView {
     vec4 lights[kMesoMaxLights];      // unit, towards each light; w: its strength
     vec4 sections[kMesoMaxSections];  // as FrameConstants::sections, in world units from the shell's origin
     vec4 environment[9];              // as FrameConstants::environment, world axes
+    MesoTransfer transfer;
+    vec4 harmonics[16];  // of the radiance of the surroundings, world axes (mesostructure/shared/harmonics.h)
 };

@@ -15,6 +15,6 @@ using vec4 = glm::vec4;
 
 #include "render/shared/meso_layout.h"
 
-static_assert(sizeof(MesoView) == 512 && offsetof(MesoView, width) == 96);
+static_assert(sizeof(MesoView) == 784 && offsetof(MesoView, width) == 96);
 
 }  // namespace vcp::frame

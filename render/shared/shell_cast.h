@@ -16,6 +16,7 @@ vec3 cutNormal;
 
 #include "render/shared/meso_far.h"
 #include "render/shared/meso_texture_lookup.h"
+#include "render/shared/meso_transfer.h"
 
 // Gives a normal where the method has none: that of the nearest data, or of the voxel's face.
 INLINE vec3 fallbackNormal(vec3 p, vec3 d) {
@@ -74,6 +75,7 @@ INLINE void hitShell(float t, vec3 normal, int piece, bool far, INOUT(ShellHit) 
     best.normal = normal;
     best.piece = piece;
     best.far = far;
+    best.cut = false;
 }
 
 INLINE void castPiece(ShellPassage passage, vec3 o, vec3 d, float start, INOUT(ShellHit) best) {
@@ -111,6 +113,7 @@ INLINE void castPiece(ShellPassage passage, vec3 o, vec3 d, float start, INOUT(S
         }
         if (fromCut && (far ? ray.o.z < view.meanHeight : isSolidAt(ray.o))) {
             hitShell(start + passage.enter, cut, at, false, best);
+            best.cut = true;
             return;
         }
         MesoResult found;
@@ -126,7 +129,9 @@ INLINE void castPiece(ShellPassage passage, vec3 o, vec3 d, float start, INOUT(S
             // On a ridge, rounding may have chosen the side that is turned away.
             if (ray.d.z < 0.0f && dot(n, ray.d) > 0.1f * length(n)) n = vec3(0.0f, 0.0f, 1.0f);
             n = t0 * n.x + t1 * n.y + t2 * n.z;
-            hitShell(t, fromCut && found.t == 0.0f ? cut : n, at, far, best);
+            bool atCut = fromCut && found.t == 0.0f;
+            hitShell(t, atCut ? cut : n, at, far, best);
+            best.cut = atCut;
             return;
         }
     }

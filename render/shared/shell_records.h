@@ -23,6 +23,7 @@ struct ShellHit {
     bool unresolved;
     int piece;  // first texel of its piece
     bool far;   // not marched: normal and light come from the appearance
+    bool cut;   // of a border or a section plane: what is shown lies within the solid
 };
 
 // Where a ray passes a piece; times count from a point of the ray where numbers are small.

@@ -120,24 +120,6 @@ TEST(AssetFile, DisplacementMapsAndGuessesComeBack) {
     }
 }
 
-TEST(AssetFile, EveryTruncationAndEveryFlippedBitIsRefused) {
-    const TestFolder folder("meso_asset_damage_test");
-    Asset asset = small("ball");
-    asset.boxes.reset();
-    ASSERT_TRUE(writeAsset(folder / "a.meso", asset).ok());
-    Bytes bytes = bytesOf(folder / "a.meso");
-    ASSERT_TRUE(parseAsset(bytes, "a").ok());
-    for (size_t size = 0; size < bytes.size(); ++size)
-        ASSERT_FALSE(parseAsset(std::span(bytes).first(size), "a").ok()) << size;
-    for (size_t bit = 0; bit < bytes.size() * 8; ++bit) {
-        bytes[bit / 8] ^= std::byte(1 << bit % 8);
-        ASSERT_FALSE(parseAsset(bytes, "a").ok()) << "bit " << bit;
-        bytes[bit / 8] ^= std::byte(1 << bit % 8);
-    }
-    bytes.push_back(std::byte{0});
-    EXPECT_FALSE(parseAsset(bytes, "a").ok());
-}
-
 /// With right hashes all over, as a liar writes them.
 void resign(Bytes& bytes) {
     AssetHeader header;
@@ -154,6 +136,72 @@ void resign(Bytes& bytes) {
     commit.headerHash = header.hash;
     commit.hash = hashBytes(std::as_bytes(std::span(&commit, 1)).first(offsetof(AssetCommit, hash)));
     std::memcpy(bytes.data() + bytes.size() - sizeof commit, &commit, sizeof commit);
+}
+
+Asset withTransfer() {
+    Asset asset;
+    asset.name = asset.solid = "ball";
+    AssetOptions options{.cells = {4, 4, 1}, .samples = 1, .distances = {.cones = {1, 1}}, .factors = {}};
+    options.withBoxes = options.withPatches = false;
+    options.transfer = TransferOptions{.cells = 4, .albedo = 0.7, .paths = 8};
+    const auto built = buildAsset(asset, options);
+    EXPECT_TRUE(built.ok()) << built.error().line();
+    return asset;
+}
+
+TEST(AssetFile, TransferComesBackAndItsLiesAreRefusedOrHarmless) {
+    const TestFolder folder("meso_asset_transfer_test");
+    const Asset asset = withTransfer();
+    ASSERT_TRUE(writeAsset(folder / "a.meso", asset).ok());
+    Bytes bytes = bytesOf(folder / "a.meso");
+    const auto read = parseAsset(bytes, "a");
+    ASSERT_TRUE(read.ok()) << read.error().line();
+    EXPECT_EQ(read->transfer->numbers, asset.transfer->numbers);
+    EXPECT_EQ(read->transfer->terms, asset.transfer->terms);
+    EXPECT_EQ(read->transfer->albedo, 0.7f);
+    EXPECT_EQ(read->transfer->paths, 8u);
+    for (size_t bit = 0; bit < bytes.size() * 8; ++bit) {
+        bytes[bit / 8] ^= std::byte(1 << bit % 8);
+        ASSERT_FALSE(parseAsset(bytes, "a").ok()) << "bit " << bit;
+        bytes[bit / 8] ^= std::byte(1 << bit % 8);
+    }
+    std::mt19937 random(8);
+    int refused = 0;
+    for (int i = 0; i < 2000; ++i) {
+        Bytes changed = bytes;
+        const size_t first = 256 + 48 * 5, at = first + random() % (changed.size() - first - 64);
+        const uint32_t value = i % 3 == 0 ? 0xffffffffu : i % 3 == 1 ? uint32_t(random()) : uint32_t(random() % 40);
+        std::memcpy(changed.data() + at, &value, std::min<size_t>(4, changed.size() - 64 - at));
+        resign(changed);
+        const auto lie = parseAsset(changed, "lie");
+        refused += !lie.ok();
+        if (!lie) continue;
+        // Whatever it says, look-ups stay in memory and are numbers.
+        const TransferReader reader(*lie->transfer);
+        std::uniform_real_distribution<double> unit(0, 1);
+        for (int k = 0; k < 5; ++k)
+            for (const float c : reader.at({unit(random), unit(random), 0.2 * unit(random)}, {0, 0, 1}).c)
+                ASSERT_TRUE(std::isfinite(c));
+    }
+    EXPECT_GT(refused, 300);
+}
+
+TEST(AssetFile, EveryTruncationAndEveryFlippedBitIsRefused) {
+    const TestFolder folder("meso_asset_damage_test");
+    Asset asset = small("ball");
+    asset.boxes.reset();
+    ASSERT_TRUE(writeAsset(folder / "a.meso", asset).ok());
+    Bytes bytes = bytesOf(folder / "a.meso");
+    ASSERT_TRUE(parseAsset(bytes, "a").ok());
+    for (size_t size = 0; size < bytes.size(); ++size)
+        ASSERT_FALSE(parseAsset(std::span(bytes).first(size), "a").ok()) << size;
+    for (size_t bit = 0; bit < bytes.size() * 8; ++bit) {
+        bytes[bit / 8] ^= std::byte(1 << bit % 8);
+        ASSERT_FALSE(parseAsset(bytes, "a").ok()) << "bit " << bit;
+        bytes[bit / 8] ^= std::byte(1 << bit % 8);
+    }
+    bytes.push_back(std::byte{0});
+    EXPECT_FALSE(parseAsset(bytes, "a").ok());
 }
 
 TEST(AssetFile, LiesBehindValidHashesAreRefusedOrHarmless) {

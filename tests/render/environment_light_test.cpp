@@ -10,6 +10,7 @@
 #include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
 
+#include "mesostructure/harmonics.h"
 #include "render/host/hit_light.h"
 
 namespace vcp {
@@ -133,6 +134,68 @@ TEST(EnvironmentLight, TurnsWithItsAxesAndTheDatasets) {
     EXPECT_LT(
         glm::length(f32::environmentLight({0, -1, 0}, downward.data()) - f32::environmentLight({0, 1, 0}, rows.data())),
         1e-5f);
+}
+
+TEST(EnvironmentLight, HarmonicsAreIntegralsOfTheRadiance) {
+    // By definition, over a picture of lamps; the unit is that of the forms.
+    const auto picture = pictureOf([](glm::dvec3 d) {
+        return glm::dvec3(0.1) + 9.0 * std::max(0.0, d.x - 0.8) + glm::dvec3(0, 2, 5) * std::max(0.0, d.y * d.z - 0.3);
+    });
+    const auto light = environmentLight(picture, kSize);
+    ASSERT_TRUE(light);
+    const double exposure = exposureOf(*light, picture);
+    for (int k = 0; k < 16; ++k) {
+        glm::dvec3 sum(0);
+        for (uint32_t y = 0; y < kSize.y; ++y) {
+            const double texel =
+                2 * kPi / kSize.x * (std::cos(kPi * y / kSize.y) - std::cos(kPi * (y + 1.0) / kSize.y));
+            for (uint32_t x = 0; x < kSize.x; ++x)
+                sum += texel * meso::f64::harmonicsOf(directionOf(x, y)).c[k] *
+                       glm::dvec3(picture[size_t{y} * kSize.x + x]);
+        }
+        // The exposure is known by the integrals of a clamped cosine, which three bands hold to some percent.
+        EXPECT_LT(glm::length(glm::dvec3(light->harmonics[size_t(k)]) - exposure * sum),
+                  0.02 * glm::length(glm::dvec3(light->harmonics[0])))
+            << k;
+    }
+    // An open surface gets from them what the quadratic form says.
+    for (const glm::dvec3 n : someNormals(50)) {
+        const meso::f64::Harmonics open = meso::f64::clampedCosine(n);
+        glm::dvec3 arrives(0);
+        for (size_t k = 0; k < 16; ++k) arrives += open.c[k] * glm::dvec3(light->harmonics[k]);
+        EXPECT_LT(glm::length(glm::max(arrives, glm::dvec3(0)) - lightAt(*light, n)), 1e-5);
+    }
+}
+
+TEST(EnvironmentLight, HarmonicsTurnAsTheFormsDo) {
+    EnvironmentLight light = *environmentNamed("studio");
+    light.up = {0.48, -0.6, 0.64}, light.turn = 70, light.strength = 1.5f;
+    const auto rows = environmentRows(light);
+    const auto harmonics = environmentHarmonics(light);
+    for (const glm::dvec3 n : someNormals(50)) {
+        const meso::f64::Harmonics open = meso::f64::clampedCosine(n);
+        glm::dvec3 arrives(0);
+        for (size_t k = 0; k < 16; ++k) arrives += open.c[k] * glm::dvec3(harmonics[k]);
+        EXPECT_LT(glm::length(glm::max(arrives, glm::dvec3(0)) -
+                              glm::dvec3(f32::environmentLight(glm::vec3(n), rows.data()))),
+                  1e-5);
+    }
+}
+
+TEST(EnvironmentLight, WhatIsSeenHasTheUnitOfTheLight) {
+    // The mean radiance is the zeroth coefficient over the root of 4 pi.
+    for (const char* name : kEnvironmentNames) {
+        const auto radiance = environmentRadiance(name);
+        glm::dvec3 mean(0);
+        constexpr int kCount = 20000;
+        for (int i = 0; i < kCount; ++i) {
+            const double z = 1 - (2 * i + 1.0) / kCount, angle = i * kPi * (3 - std::sqrt(5.0)),
+                         r = std::sqrt(1 - z * z);
+            mean += radiance({r * std::cos(angle), r * std::sin(angle), z}) / double(kCount);
+        }
+        const glm::dvec3 known = glm::dvec3(environmentNamed(name)->harmonics[0]) / std::sqrt(4 * kPi);
+        EXPECT_LT(glm::length(mean - known), 0.01 * glm::length(known)) << name;
+    }
 }
 
 TEST(EnvironmentLight, TheBrightestSurfaceGetsOne) {

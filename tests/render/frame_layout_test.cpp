@@ -100,9 +100,10 @@ void expectSameLayout(std::span<const uint32_t> spirv) {
 
 TEST(FrameLayout, Mesostructure) {
     const Offsets offsets = offsetsIn(kMesoSurfaceSpirv);
-    for (const char* type : {"MesoRecord", "MesoLevel", "MesoBorder", "MesoView", "MesoImage"})
+    for (const char* type : {"MesoRecord", "MesoLevel", "MesoBorder", "MesoView", "MesoImage", "MesoTransfer"})
         ASSERT_TRUE(offsets.contains(type)) << type;
-    using meso::f32::MesoRecord, meso::f32::MesoLevel, meso::f32::MesoBorder, frame::MesoView, frame::MesoImage;
+    using meso::f32::MesoRecord, meso::f32::MesoLevel, meso::f32::MesoBorder, frame::MesoView, frame::MesoImage,
+        frame::MesoTransfer;
     using Words = std::vector<uint32_t>;
     EXPECT_EQ(offsets.at("MesoRecord"), (Words{AT(MesoRecord, extent),     AT(MesoRecord, unit),
                                                AT(MesoRecord, cell),       AT(MesoRecord, reach),
@@ -136,7 +137,10 @@ TEST(FrameLayout, Mesostructure) {
                                              AT(MesoView, shadowLift),  AT(MesoView, hasEnvironment),
                                              AT(MesoView, unused0),     AT(MesoView, unused1),
                                              AT(MesoView, lights),      AT(MesoView, sections),
-                                             AT(MesoView, environment)}));
+                                             AT(MesoView, environment), AT(MesoView, transfer),
+                                             AT(MesoView, harmonics)}));
+    EXPECT_EQ(offsets.at("MesoTransfer"),
+              (Words{AT(MesoTransfer, first), AT(MesoTransfer, across), AT(MesoTransfer, back), AT(MesoTransfer, up)}));
     EXPECT_EQ(offsets.at("MesoImage"),
               (Words{AT(MesoImage, first), AT(MesoImage, width), AT(MesoImage, height), AT(MesoImage, levels)}));
 }

@@ -401,6 +401,14 @@ Result<BenchMesoReport> benchMeso(const BenchMesoOptions& options) {
             VCP_TRY_ASSIGN(const auto factors, compareMesoFactors(subject->asset, *subject->shape));
             report.factors.insert(report.factors.end(), factors.begin(), factors.end());
         }
+        if (options.light) {
+            const auto lit = [&](double part) {
+                return !options.progress ||
+                       options.progress(assets[a] + ": light", (double(a) + part) / double(assets.size()));
+            };
+            VCP_TRY_ASSIGN(const auto lights, compareMesoLight(subject->asset, *subject->shape, lit));
+            report.lights.insert(report.lights.end(), lights.begin(), lights.end());
+        }
         if (options.checkRays == 0) continue;
         if (!told("conservative maps")) return Error::cancelled();
         VCP_TRY_ASSIGN(const auto checks,

@@ -33,6 +33,7 @@ struct BenchMesoOptions {
     int repetitions = 3;                ///< rounds over the methods
     bool published = false;             ///< compares with the paper's tables; its Table 3 is made anew
     bool factors = false;               ///< compares the factors of displacement maps
+    bool light = false;                 ///< compares light from everywhere on a tile with a path tracer
     bool remesh = false;                ///< measures remeshing as well (bench_remesh.h)
     uint64_t checkRays = 0;             ///< rays of the conservative test for each asset; 0: not made
     /// Called with what is being done; false cancels. May be empty.
@@ -113,6 +114,18 @@ struct MesoFactors {
     double wrongHits = 0;   ///< part whose hit, told by half a point before the boundary, is wrong
 };
 
+/// Light from everywhere on a picture of one tile, at 45 degrees. `form`: as if the surface were open (9 coefficients
+/// of the light, no shadow); by as many paths as the truth, of 16 coefficients of the light; by the volume of transfer,
+/// which has them too. Truth is the path tracer's under the surroundings themselves, or the form that is named after
+/// "against".
+struct MesoLight {
+    std::string asset, sky, form;
+    double relativeMse = 0;  ///< mean of (light - truth)^2 / (truth^2 + 0.01), over pixels and channels
+    double flipMean = 0;     ///< of the pictures, on a surface of one grey
+    double energy = 0;       ///< light over truth, summed
+    uint64_t bytes = 0;      ///< of the volume
+};
+
 /// One view of a remeshed height field (bench_remesh.h).
 struct RemeshRow {
     std::string asset, view, filter;
@@ -131,6 +144,7 @@ struct BenchMesoReport {
     std::vector<MesoCheck> checks;
     std::vector<MesoPublished> published;
     std::vector<MesoFactors> factors;
+    std::vector<MesoLight> lights;
 };
 
 /// Names the method, at its default knob, that times are divided by: relief mapping, binary, 32 steps, for height
@@ -149,6 +163,11 @@ Result<std::vector<MesoCheck>> checkMesoMaps(const std::string& asset, const mes
 
 /// Compares factors of an asset's displacement map of 32 points along x. Errors: the builders'.
 Result<std::vector<MesoFactors>> compareMesoFactors(const meso::Asset& asset, const meso::Shape& shape);
+
+/// Compares light from everywhere on an asset's tile, under each of kEnvironmentNames; where the asset holds no
+/// transfer, it is traced. `progress` may be empty; false cancels. Errors: traceTransfer's; Usage (nothing is seen).
+Result<std::vector<MesoLight>> compareMesoLight(const meso::Asset& asset, const meso::Shape& shape,
+                                                const std::function<bool(double)>& progress);
 
 /// Judges the rays whose truth is known; `texel` in tile units.
 MesoJudged judgeMeso(const std::vector<meso::MarchResult>& results, const std::vector<meso::TruthHit>& truths,

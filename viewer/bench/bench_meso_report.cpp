@@ -207,6 +207,15 @@ std::string benchMesoJson(const BenchMesoReport& report) {
                            {"rms_points", f.rmsPoints},
                            {"off_by_a_point", f.offByPoint},
                            {"wrong_hits", f.wrongHits}});
+    Json lights = Json::array();
+    for (const MesoLight& l : report.lights)
+        lights.push_back({{"asset", l.asset},
+                          {"sky", l.sky},
+                          {"form", l.form},
+                          {"relative_mse", l.relativeMse},
+                          {"flip_mean", l.flipMean},
+                          {"energy", l.energy},
+                          {"bytes", l.bytes}});
     Json remeshed = Json::array();
     for (const RemeshRow& row : report.remeshed)
         remeshed.push_back({{"asset", row.asset},
@@ -223,8 +232,8 @@ std::string benchMesoJson(const BenchMesoReport& report) {
                             {"triangles", row.triangles},
                             {"bytes", row.bytes},
                             {"ms", row.ms}});
-    return Json{{"rows", rowsOf(report)}, {"headline", headlines}, {"checks", checks},
-                {"published", published}, {"factors", factors},    {"remeshed", remeshed}}
+    return Json{{"rows", rowsOf(report)}, {"headline", headlines}, {"checks", checks},    {"published", published},
+                {"factors", factors},     {"lights", lights},      {"remeshed", remeshed}}
         .dump();
 }
 
@@ -272,6 +281,14 @@ std::string benchMesoMarkdown(const BenchMesoReport& report) {
         for (const MesoFactors& f : report.factors)
             text += fmt::format("| {} | {} | {} | {} | {:.3f} | {:.3f} | {:.1f} | {:.1f} |\n", f.asset, f.form, f.rank,
                                 f.clusters, double(f.bytes) * 1e-6, f.rmsPoints, 100 * f.offByPoint, 100 * f.wrongHits);
+    }
+    if (!report.lights.empty()) {
+        text +=
+            "\n| asset | light from everywhere | form | relative MSE | FLIP | energy | MB "
+            "|\n|---|---|---|---|---|---|---|\n";
+        for (const MesoLight& l : report.lights)
+            text += fmt::format("| {} | {} | {} | {:.4f} | {:.4f} | {:.3f} | {:.2f} |\n", l.asset, l.sky, l.form,
+                                l.relativeMse, l.flipMean, l.energy, double(l.bytes) * 1e-6);
     }
     if (!report.remeshed.empty()) {
         text +=

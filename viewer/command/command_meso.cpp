@@ -2,6 +2,7 @@
 #include <array>
 #include <charconv>
 #include <chrono>
+#include <functional>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -35,6 +36,8 @@ struct BuildMeso {
     bool noBoxes = false, noPatches = false, overwrite = false, guesses = false, noVisibility = false;
     std::string gdm, directions = "16x32";
     int rank = 16, bits = 16;
+    int transfer = 0;  // cells along x; 0: none
+    TransferOptions traced;
     uint64_t memoryBytes = uint64_t{1} << 30;
     ReportOptions report;
 };
@@ -77,6 +80,11 @@ Result<AssetOptions> optionsOf(const BuildMeso& c) {
     options.samples = c.samples;
     options.withBoxes = !c.noBoxes, options.withPatches = !c.noPatches;
     options.withGuesses = c.guesses;
+    if (c.transfer > 0) {
+        options.transfer = c.traced;
+        options.transfer->cells = c.transfer, options.transfer->seed = c.seed;
+        options.transfer->memoryBytes = c.memoryBytes;
+    }
     return options;
 }
 
@@ -161,6 +169,10 @@ Json toJson(const std::string& file, uint64_t fileBytes, const Asset& a) {
     json["gdm_rank"] = a.gdm ? Json(a.gdm->factors ? a.gdm->factors->rank : 0) : Json();
     json["gdm_bytes"] = a.gdm ? Json(a.gdm->bytes()) : Json();
     json["guess_bytes"] = a.guesses ? Json(a.guesses->bytes()) : Json();
+    json["transfer"] = a.transfer ? cells(a.transfer->grid.cells) : Json();
+    json["transfer_cells"] = a.transfer ? Json(a.transfer->cells()) : Json();
+    json["transfer_albedo"] = a.transfer ? Json(a.transfer->albedo) : Json();
+    json["transfer_bytes"] = a.transfer ? Json(a.transfer->bytes()) : Json();
     json["field_bytes"] = a.field ? Json(a.field->bytes()) : Json();
     return json;
 }
@@ -200,6 +212,12 @@ std::string summary(const std::string& file, uint64_t fileBytes, const Asset& a)
                             formatBytes(a.gdm->bytes()));
     }
     if (a.guesses) text += fmt::format("\n  guesses     {}", formatBytes(a.guesses->bytes()));
+    if (a.transfer) {
+        const glm::ivec3 n = a.transfer->grid.cells;
+        text += fmt::format("\n  transfer    {} x {} x {} cells, {} with surface, {} paths each, albedo {:.3g}, {}",
+                            n.x, n.y, n.z, formatCount(a.transfer->cells()), a.transfer->paths, a.transfer->albedo,
+                            formatBytes(a.transfer->bytes()));
+    }
     if (a.field) {
         const glm::ivec3 n = a.field->grid.cells;
         text += fmt::format("\n  samples     {} x {} x {}, {}", n.x, n.y, n.z + 1, formatBytes(a.field->bytes()));
@@ -225,13 +243,16 @@ Result<int> runBuild(const BuildMeso& command) {
     VCP_TRY_ASSIGN(options.gdm, displacementOf(command, (*shape)->extent()));
     const InterruptScope catching;
     ProgressDisplay display(command.report.progressStyle(), stderr);
-    if (options.gdm)
-        options.gdm->traced.shareOut = [&display](size_t count, const auto& fill) {
-            return shareOut(count, fill, [&display](double part) {
-                display.update("distances", part);
+    const auto sharedOut = [&display](const char* stage) {
+        return [&display, stage](size_t count, const std::function<void(size_t first, size_t last)>& fill) {
+            return shareOut(count, fill, [&display, stage](double part) {
+                display.update(stage, part);
                 return !interrupted();
             });
         };
+    };
+    if (options.gdm) options.gdm->traced.shareOut = sharedOut("distances");
+    if (options.transfer) options.transfer->shareOut = sharedOut("light");
     if (const auto built = buildAsset(asset, options); !built) return named(built.error());
     display.finish();
     VCP_TRY_ASSIGN(const auto bytes, writeAsset(command.out, asset, rules));
@@ -320,7 +341,20 @@ RunCommand addMesoBuild(CLI::App& meso) {
         ->check(CLI::IsMember({8, 16}));
     app->add_flag("--no-visibility", command->noVisibility, "Without the bits that say what is hit, as published");
     app->add_flag("--guesses", command->guesses, "With guesses of safe lengths (method gdm-safe)");
-    addMemory(*app, command->memoryBytes, "Memory for the map's distances [1G]");
+    app->add_option(
+           "--transfer", command->transfer,
+           "With what the walls do to light from everywhere, in so many cells along x (\"transfer\" of scenes)")
+        ->type_name("N")
+        ->check(CLI::Range(1, kMaxGridEdge));
+    app->add_option("--albedo", command->traced.albedo, "Its walls give back so much of the light that they get")
+        ->type_name("A")
+        ->capture_default_str()
+        ->check(CLI::Range(0.0, 1.0));
+    app->add_option("--paths", command->traced.paths, "Paths of light that are traced for each of its cells")
+        ->type_name("N")
+        ->capture_default_str()
+        ->check(CLI::Range(1, 1 << 24));
+    addMemory(*app, command->memoryBytes, "Memory for the map's distances and for the light [1G]");
     app->add_option("--up", command->up, "The mesh's axis out of the surface")
         ->capture_default_str()
         ->check(CLI::IsMember({"x", "y", "z"}));

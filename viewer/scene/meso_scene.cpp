@@ -113,6 +113,23 @@ private:
     std::map<std::pair<std::string, bool>, std::shared_ptr<const HeightLevels>> levels_;
 };
 
+using Transfer = std::shared_ptr<const TransferVolume>;
+
+/// Returns what an asset holds of light, where a description asks for it. Errors: Usage.
+Result<Transfer> transferOf(const MesoSurfaceDescription& d, const Asset& asset) {
+    if (!d.withTransfer) return Transfer();
+    const auto refused = [](std::string message) {
+        return Error{.code = ErrorCode::Usage, .message = std::move(message)};
+    };
+    if (d.method.name == kRemeshMethod)
+        return refused(fmt::format("{} takes no transfer: leave it out, or take another method", kRemeshMethod));
+    if (d.heightScale != 1)
+        return refused("transfer holds for the asset's own height: leave \"height\" out, or make a higher asset");
+    if (!asset.transfer)
+        return refused(fmt::format("{} holds no transfer: make an asset with it, by `vcp meso build`", d.asset));
+    return asset.transfer;
+}
+
 void warn(const MesoSurfaceDescription& d, const BaseSurface& base, const Shell& shell,
           std::vector<std::string>& warnings) {
     if (const auto edges = isFile(d) ? edgesOf(base) : SurfaceEdges(); !edges) {
@@ -197,6 +214,7 @@ Result<MesoScene> makeMesoScene(std::span<const MesoSurfaceDescription> descript
     Textures textures;
     Remeshing remeshing;
     std::map<std::pair<std::string, double>, std::shared_ptr<const Appearance>> appearances;
+    std::map<std::string, Transfer> transfers;  // an asset is read once for each surface, and kept once
     for (const MesoSurfaceDescription& d : descriptions) {
         SurfacePath& path = scene.paths.emplace_back(d.path);
         for (glm::dvec3& point : path.points) point -= d.place;
@@ -204,6 +222,8 @@ Result<MesoScene> makeMesoScene(std::span<const MesoSurfaceDescription> descript
         if (!asset) return d.from.blamed(asset.error());
         const auto base = baseOf(d);
         if (!base) return d.from.blamed(base.error());
+        const auto transfer = transferOf(d, *asset);
+        if (!transfer) return d.from.blamed(transfer.error());
         if (d.method.name == kRemeshMethod) {
             auto surface = remeshing.make(d, *asset, *base);
             if (!surface) return d.from.blamed(surface.error());
@@ -237,7 +257,8 @@ Result<MesoScene> makeMesoScene(std::span<const MesoSurfaceDescription> descript
             if (!*texture) return texture->error();
         surface.colours = *std::move(colours), surface.normals = *std::move(normals);
         surface.lift = shadowLift(**arrays, edge);
-        if (d.withFar) {
+        if (*transfer) surface.transfer = transfers.try_emplace(d.asset, *transfer).first->second;
+        if (d.withFar && !*transfer) {
             auto& far = appearances[{d.asset, d.heightScale}];
             if (!far) {
                 VCP_TRY_ASSIGN(far, farOf(*asset, d.heightScale));

@@ -73,7 +73,8 @@ struct MesoSurfaceDescription {
     glm::vec3 colour{0.8f};  ///< encoded
     std::string colourTexture, normalTexture;  ///< pictures over the tile (viewer/scene/tile_texture.h); empty: none
     bool withBase = true;
-    bool withFar = true;  ///< far away it is not marched (MesoLook::errorPixels)
+    bool withFar = true;        ///< far away it is not marched (MesoLook::errorPixels)
+    bool withTransfer = false;  ///< light from everywhere comes as the asset's transfer says; then it has no far look
     ScenePlace from = {};
 };
 

@@ -62,6 +62,7 @@ OrderedJson surfaceJson(const MesoSurfaceDescription& surface) {
         json["directions"] = OrderedJson::array({surface.method.directions.x, surface.method.directions.y});
     put("base", surface.withBase, usual.withBase);
     put("far", surface.withFar, usual.withFar);
+    put("transfer", surface.withTransfer, usual.withTransfer);
     return json;
 }
 

@@ -150,6 +150,75 @@ TEST_F(HostSurfaces, ModesSectionsLightsTexturesAndFar) {
     EXPECT_GT(std::accumulate(iterations.begin(), iterations.end(), uint64_t{0}), 1000u);
 }
 
+std::shared_ptr<const meso::TransferVolume> transferOf(const meso::Asset& asset) {
+    return std::make_shared<const meso::TransferVolume>(
+        *traceTransfer(**shapeOf(asset), {.cells = 12, .albedo = 0.7, .paths = 24}));
+}
+
+TEST_F(HostSurfaces, WithTransferAsTheShadersHaveIt) {
+    MesoSurface hollow = mesoSurface(relief(), "boxes", "torus", 0.3);
+    hollow.transfer = transferOf(relief());
+    MesoSurface beads = mesoSurface(solidAsset("beads"), "boxes", "cylinder", 0.2, 3, {0.6, -0.3, 0.2});
+    beads.transfer = transferOf(solidAsset("beads"));
+    // One without lies before and behind the others, in all orders of drawing.
+    const MesoSurface open = mesoSurface(relief(), "pyramid", "sphere", 0.2, 2, {-0.5, -0.4, 0.3});
+    for (const bool withShadows : {false, true}) {
+        Difference all;
+        const auto surfaces = withShadows ? std::vector{open, beads, hollow} : std::vector{hollow, open, beads};
+        setSurfaces(surfaces);
+        for (const Camera& camera : views()) {
+            FrameRequest request = lookFrom(camera);
+            request.shading.environment = environmentNamed("clear");
+            request.shading.shadows = withShadows;
+            request.shading.lightStrength = withShadows ? 0.4f : 0.0f;
+            all += differenceOf(request);
+        }
+        expectAlike(all);
+    }
+}
+
+TEST_F(HostSurfaces, TransferOfAPlaneLooksOpenOnAnySurface) {
+    // A plane hides nothing from itself: its transfer is the clamped cosine, in the frame of each piece of the base,
+    // mirrored maps too. What is drawn with it is what is drawn without.
+    MesoSurface with = mesoSurface(plateau(), "boxes", "sphere", 0.1);
+    with.transfer = std::make_shared<const meso::TransferVolume>(
+        *traceTransfer(**shapeOf(plateau()), {.cells = 4, .paths = 20000}));
+    MesoSurface without = with;
+    without.transfer = nullptr;
+    MesoSurface relieved = mesoSurface(relief(), "boxes", "sphere", 0.3);
+    MesoSurface shadowed = relieved;
+    shadowed.transfer = transferOf(relief());
+    FrameRequest request = lookFrom(views()[0]);
+    request.shading.environment = environmentNamed("clear");
+    request.shading.environment->turn = 50;
+    const auto drawn = [&](const MesoSurface& surface) {
+        EXPECT_TRUE(host_->setSurfaces(std::vector{surface}));
+        return test::drawnBy(*host_, request).picture;
+    };
+    const auto apart = [&](const Picture& a, const Picture& b) {
+        double sum = 0;
+        int most = 0;
+        for (size_t i = 0; i < a.rgba.size(); ++i)
+            sum += std::abs(a.rgba[i] - b.rgba[i]), most = std::max(most, std::abs(a.rgba[i] - b.rgba[i]));
+        return std::pair(sum / double(a.rgba.size()), most);
+    };
+    const auto [mean, most] = apart(drawn(with), drawn(without));
+    EXPECT_LE(most, 4);
+    EXPECT_LT(mean, 0.5);
+    EXPECT_GT(apart(drawn(shadowed), drawn(relieved)).first, 1);
+    // What no picture asks for makes no pipeline and no bytes.
+    ASSERT_TRUE(renderer_->setSurfaces(std::vector{without}));
+    request.shading.environment.reset();
+    const auto plain = test::drawnBy(*renderer_, request).picture;
+    const uint32_t pipelines = renderer_->render(request)->pipelines;
+    ASSERT_TRUE(renderer_->setSurfaces(std::vector{with}));
+    EXPECT_EQ(test::drawnBy(*renderer_, request).picture, plain);
+    EXPECT_EQ(renderer_->render(request)->pipelines, pipelines);
+    request.shading.environment = environmentNamed("clear");
+    test::drawnBy(*renderer_, request);
+    EXPECT_GT(renderer_->render(request)->pipelines, pipelines);
+}
+
 TEST_F(HostSurfaces, NearerOfDatasetAndSurface) {
     const auto scene = test::cubeScene(0);
     const std::vector<MesoSurface> surfaces{mesoSurface(relief(), "boxes", "torus", 0.3, 2, {11.5, 8, 11})};

@@ -214,6 +214,41 @@ TEST_F(MesoCommands, FarSurfacesAreNotMarched) {
     EXPECT_LT(far["iterations_mean"], 0.5 * marched["iterations_mean"].get<double>());
 }
 
+TEST_F(MesoCommands, LightFindsItsWayBetweenWalls) {
+    ASSERT_EQ(run("meso build hemispheres --texels 32 --grid 16 --transfer 16 --paths 64 --albedo 0 -o " +
+                  path("a.meso") + " --progress none")
+                  .status,
+              0);
+    const Ran told = run("meso info " + path("a.meso") + " --json");
+    const Json info = Json::parse(told.out);
+    EXPECT_EQ(info["transfer"][0], 16);
+    EXPECT_GT(info["transfer_cells"].get<int>(), 255);
+    EXPECT_EQ(info["transfer_albedo"], 0.0);
+    const auto drawn = [&](const std::string& keys, const std::string& rest) {
+        const Ran ran = draw(scene(R"({"asset": "a.meso", "tiles": 2)" + keys + "}", rest), "--size 96x72");
+        EXPECT_EQ(ran.status, 0) << ran.err;
+        return pixels();
+    };
+    const std::string sky = R"(, "environment": {"source": "overcast"})";
+    const auto open = drawn("", sky), shadowed = drawn(R"(, "transfer": true)", sky);
+    // Black walls give nothing back: hollows are darker, and nothing is brighter but by what 64 paths are off.
+    int64_t less = 0, more = 0;
+    for (size_t i = 0; i < open.size(); ++i)
+        (shadowed[i] < open[i] ? less : more) += std::abs(int(shadowed[i]) - int(open[i]));
+    EXPECT_GT(less, 20 * more);
+    EXPECT_GT(less, int64_t(open.size()) / 2);
+    // Without surroundings there is nothing to show.
+    EXPECT_EQ(drawn(R"(, "far": false)", ""), drawn(R"(, "transfer": true)", ""));
+    const auto refused = [&](const std::string& surface) {
+        const Ran ran = draw(scene(surface, sky), "");
+        EXPECT_EQ(ran.status, 1);
+        return ran.err;
+    };
+    EXPECT_NE(refused(R"({"asset": "beads", "transfer": true})").find("vcp meso build"), std::string::npos);
+    EXPECT_NE(refused(R"({"asset": "a.meso", "height": 2, "transfer": true})").find("height"), std::string::npos);
+    EXPECT_EQ(run("meso build beads --transfer 256 --memory 1M -o " + path("b.meso")).status, 1);
+}
+
 TEST_F(MesoCommands, SaysWhatIsWrong) {
     std::ofstream(path("empty.png")) << "";
     std::ofstream(path("text.png")) << "not a picture";

@@ -74,6 +74,7 @@ TEST(SceneFile, WhatIsWrongIsSaidWithItsLine) {
         {beside("\"mesostructure\": [{\"asset\": \"beads\",\n\"colour\": [1, 2, 1]}]"), 4, "from 0 to 1"},
         {beside("\"mesostructure\": [{\"asset\": \"beads\",\n\"texture\": 7}]"), 4, "\"texture\""},
         {beside("\"mesostructure\": [{\"asset\": \"beads\",\n\"normal_texture\": \"\"}]"), 4, "\"normal_texture\""},
+        {beside("\"mesostructure\": [{\"asset\": \"beads\",\n\"transfer\": 1}]"), 4, "\"transfer\""},
         {beside("\"mesostructure\": [{\n\"asset\": \"brick\"}]"), 4, "\"asset\" must be"},
         {beside("\"mesostructure\": [{\"asset\": \"beads\",\n\"path\": [[1, 2, 3]]}]"), 4, "2 to 1000 points"},
         {beside("\"mesostructure\": [{\"asset\": \"beads\",\n\"path\": [[1, 2, 3], 4]}]"), 4, "three numbers"},
@@ -148,6 +149,7 @@ TEST(SceneFile, WhatIsWrittenIsReadAgain) {
     surface.method.rank = 0;
     surface.method.directions = {8, 12};
     surface.withBase = surface.withFar = false;
+    surface.withTransfer = true;
     scene.lights = {{true, glm::vec3(0.6f, 0, 0.8f), 1}, {false, glm::vec3(0, 1, 0), 0.25f}};
     scene.environment = EnvironmentChoice{"/elsewhere/roof.hdr", -30, 0.5f};
     scene.camera = OrbitCamera();
@@ -190,6 +192,7 @@ TEST(SceneFile, WhatIsWrittenIsReadAgain) {
     EXPECT_EQ(read->surfaces[0].method.rank, 0);
     EXPECT_EQ(read->surfaces[0].method.directions, glm::ivec2(8, 12));
     EXPECT_FALSE(read->surfaces[0].withBase || read->surfaces[0].withFar);
+    EXPECT_TRUE(read->surfaces[0].withTransfer);
     ASSERT_TRUE(read->lights.size() == 2 && read->camera);
     for (size_t i = 0; i < 2; ++i) {
         EXPECT_EQ(read->lights[i].followsCamera, i == 0);
