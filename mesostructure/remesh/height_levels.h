@@ -10,6 +10,7 @@
 
 #include <glm/vec2.hpp>
 
+#include "mesostructure/remesh/remesh_math.h"
 #include "mesostructure/shape.h"
 #include "octree/io/result.h"
 
@@ -90,24 +91,37 @@ HeightLevel fitLevel(const HeightLevel& map, glm::ivec2 size, const LevelFitOpti
 /// Returns the mean distance between a level and the map, at the map's texels.
 double levelVolume(const HeightLevel& map, const HeightLevel& level);
 
+/// Levels as remesh_heights.h reads them.
+template <class Real>
+struct StoredLevels {
+    struct RemeshLevel {
+        const float* heights;
+        glm::ivec2 size;
+        glm::vec<2, Real> texels;
+    };
+    const HeightLevels* from;
+
+    [[nodiscard]] RemeshLevel remeshLevel(int level) const {
+        const HeightLevel& of = from->levels()[size_t(level)];
+        return {of.heights.data(), of.size, {Real(of.size.x), Real(double(of.size.y) / from->rows())}};
+    }
+    [[nodiscard]] int remeshLevels() const { return int(from->levels().size()); }
+    [[nodiscard]] static Real remeshTexel(const RemeshLevel& level, int i) { return Real(level.heights[i]); }
+};
+
+template <class Real>
+using RemeshHeights = remeshing::RemeshHeights<Real, StoredLevels<Real>>;
+
 template <class Real>
 Real HeightLevels::height(int level, glm::vec<2, Real> at) const {
-    const HeightLevel& from = levels_[size_t(level)];
-    const Real x = at.x * Real(from.size.x), y = at.y * Real(double(from.size.y) / rows_);
-    const Real left = std::floor(x), lower = std::floor(y), u = x - left, v = y - lower;
-    const int i = int(left), j = int(lower);
-    const Real low = Real(from.at(i, j)) * (1 - u) + Real(from.at(i + 1, j)) * u;
-    const Real high = Real(from.at(i, j + 1)) * (1 - u) + Real(from.at(i + 1, j + 1)) * u;
-    return low * (1 - v) + high * v;
+    RemeshHeights<Real> heights{{this}};
+    return heights.remeshLevelHeight(heights.remeshLevel(level), at);
 }
 
 template <class Real>
 Real HeightLevels::height(glm::vec<2, Real> at, Real texels) const {
-    const Real top = Real(levels_.size() - 1);
-    const Real level = texels > 1 ? std::min(std::log2(texels), top) : Real(0), whole = std::floor(level);
-    const Real part = level - whole, fine = height(int(whole), at);
-    if (part <= 0) return fine;
-    return fine * (1 - part) + height(int(whole) + 1, at) * part;
+    RemeshHeights<Real> heights{{this}};
+    return heights.remeshHeight(heights.remeshFootprint(texels), at);
 }
 
 }  // namespace vcp::meso

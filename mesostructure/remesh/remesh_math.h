@@ -18,21 +18,65 @@ namespace remeshing {
 using namespace glm;
 using uint = uint32_t;
 
+/// Takes no call, as glm's does: x86-64 cannot round before SSE 4.1.
+inline float floor(float x) {
+    const float whole = std::abs(x) < 8388608.0f ? float(int(x)) : x;
+    return whole > x ? whole - 1.0f : whole;
+}
+inline double floor(double x) { return std::floor(x); }
+
 #define INLINE static inline
 #define CONST_REF(T) const T&
 #define CONSTANT static constexpr
+#define PRECISE
 
 template <class T>
 struct RemeshMath {
     using Real = T;
+    using Real2 = glm::vec<2, T>;
     using Real3 = glm::vec<3, T>;
 
+#include "mesostructure/shared/remesh_layout.h"
 #include "mesostructure/shared/remesh_math.h"
 };
 
 #undef INLINE
-#undef CONST_REF
+#define INLINE [[gnu::always_inline]] inline
 #undef CONSTANT
+
+/// The heights of filter levels; `Levels` has RemeshLevel and what remesh_heights.h says.
+template <class T, class Levels>
+struct RemeshHeights : Levels {
+    using Real = T;
+    using Real2 = glm::vec<2, T>;
+    using Levels::remeshLevel, Levels::remeshLevels, Levels::remeshTexel;
+    using typename Levels::RemeshLevel;
+
+#include "mesostructure/shared/remesh_heights.h"
+};
+
+/// The sweep of a piece; `Piece` has what remesh_sweep.h says.
+template <class T, class Piece>
+struct RemeshSweeping : RemeshMath<T>, Piece {
+    using Real = T;
+    using Real2 = glm::vec<2, T>;
+    using Real3 = glm::vec<3, T>;
+    using Math = RemeshMath<T>;
+    using Math::remeshBetween, Math::remeshColumn, Math::remeshDepth, Math::remeshEdge, Math::remeshNearestPart,
+        Math::remeshPlan;
+    using Piece::remeshAddTriangle, Piece::remeshAddVertex, Piece::remeshCell, Piece::remeshCorner, Piece::remeshFrame,
+        Piece::remeshFootprint, Piece::remeshHeight, Piece::remeshLevels, Piece::remeshMapWidth, Piece::remeshSeam,
+        Piece::view;
+    using typename Math::RemeshColumn, typename Math::RemeshCorner, typename Math::RemeshFrame,
+        typename Math::RemeshPlan, typename Math::RemeshSeam;
+    using typename Piece::RemeshFootprint;
+
+#include "mesostructure/shared/remesh_sweep.h"
+};
+
+#undef INLINE
+#undef CONST_REF
+#undef PRECISE
 
 }  // namespace remeshing
 

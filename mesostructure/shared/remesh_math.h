@@ -1,6 +1,7 @@
 // View-dependent remeshing in grid space (Gumhold and Huettner 1999, 3): where a corner lies in the grid, how an edge
 // is split, which way a triangle is swept, and which grid points its columns have. Compiles as C++
-// (mesostructure/remesh/remesh_math.h, in single and in double precision) and is written in what GLSL has as well.
+// (mesostructure/remesh/remesh_math.h, in single and in double precision) and as GLSL
+// (render/shaders/remesh_piece.glsl). PRECISE keeps a device from contracting: C++ is compiled so as a whole.
 //
 // Eye space: x right, y up, z forward, world units. Grid space: x and y are pixels of the whole picture in units of a
 // cell, z is the logarithm of the depth in the same units (eq. 4), so that cells are cubes in the world as well.
@@ -12,6 +13,36 @@ struct RemeshGrid {
     Real nearest;     // depth, world units: nearer corners are taken to be there, so that a logarithm exists
     Real depthScale;  // 1 / ln(1 + 1 / focal): cells that a factor e in depth spans
     uint isParallel;  // 1: rays are parallel; depth is not logarithmic
+};
+
+// How a frame's points are found.
+struct RemeshView {
+    RemeshGrid grid;
+    Real cellSize;   // world units of a cell at depth 1, or at any of parallel rays
+    uint takesMost;  // 1: HeightAccess::Most
+};
+
+// A corner of a piece. What is interpolated over the piece is the part up to `height`.
+struct RemeshCorner {
+    Real3 position, direction;  // eye space
+    ivec3 grid;
+    Real2 uv;
+    Real density;  // texels a world unit
+    Real height;   // of the corner itself, the same in all pieces
+    Real weight;   // 1 / depth: what perspective interpolates with
+};
+
+// The coordinates of an edge's other side, at its start and its end.
+struct RemeshSeam {
+    bool is;
+    Real2 start, end;
+};
+
+// Derivatives of a base triangle's places and directions by its texture coordinates; eye space.
+struct RemeshFrame {
+    Real3 byU, byV, directionByU, directionByV;
+    Real3 facet;  // the triangle's own normal
+    Real turned;  // sign of a product of derivatives that points outwards; 0 where the map has no area
 };
 
 // Corners lie at most so many cells from the eye's axis: their differences are whole numbers of 32 bits.
@@ -103,8 +134,15 @@ INLINE RemeshPlan remeshPlan(ivec3 g0, ivec3 g1, ivec3 g2) {
     return plan;
 }
 
+// Whole quotients of a number of either sign by one above 0.
+INLINE int remeshFloorDivided(int n, int d) {
+    int q = n / d;
+    return q * d > n ? q - 1 : q;
+}
+
 // The grid points of a column within a triangle: whole side coordinates from `from`, `count` of them, between the
 // primary edge at `bottom` and the side edge at `top`, at least half a cell from both. What is nearer is the edges'.
+// How many there are is found in whole numbers, so that no rounding changes it.
 struct RemeshColumn {
     Real bottom, top;
     int from, count;
@@ -113,10 +151,15 @@ struct RemeshColumn {
 // `p`, `q`: (sweep, side) of the primary edge's ends; `a`, `b`: of the side edge's, the lesser sweep coordinate first.
 INLINE RemeshColumn remeshColumn(ivec2 p, ivec2 q, ivec2 a, ivec2 b, int column) {
     RemeshColumn made;
-    made.bottom = Real(p.y) + Real(q.y - p.y) * Real(column - p.x) / Real(q.x - p.x);
-    made.top = Real(a.y) + Real(b.y - a.y) * Real(column - a.x) / Real(b.x - a.x);
-    made.from = int(ceil(made.bottom + Real(0.5)));
-    made.count = max(int(floor(made.top - Real(0.5))) - made.from + 1, 0);
+    int low = (q.y - p.y) * (column - p.x), lowSpan = q.x - p.x, high = (b.y - a.y) * (column - a.x),
+        highSpan = b.x - a.x;
+    PRECISE Real bottom = Real(p.y) + Real(low) / Real(lowSpan), top = Real(a.y) + Real(high) / Real(highSpan);
+    made.bottom = bottom;
+    made.top = top;
+    // The least whole number of at least bottom + 1/2, and the greatest of at most top - 1/2.
+    made.from = p.y - remeshFloorDivided(-2 * low - lowSpan, 2 * lowSpan);
+    int last = a.y + remeshFloorDivided(2 * high - highSpan, 2 * highSpan);
+    made.count = max(last - made.from + 1, 0);
     return made;
 }
 
@@ -130,6 +173,6 @@ INLINE int remeshNearestPart(int from, int to, int cells, int column) {
 // The k-th of the n points of an edge between corners with weights `a` and `b`: symmetric, so that it is the same from
 // either end (a (n - k) + b k, without contraction).
 INLINE Real remeshBetween(Real a, Real b, int k, int n) {
-    Real first = a * Real(n - k), second = b * Real(k);
-    return first + second;
+    PRECISE Real sum = a * Real(n - k) + b * Real(k);
+    return sum;
 }

@@ -36,12 +36,22 @@ Result<void> MesoSurfacePass::setSurfaces(std::span<const MesoSurface> surfaces)
     remeshed_ = 0;
     ++version_;
     std::map<const meso::MarchArrays*, std::shared_ptr<MesoTexels>> uploaded;
+    std::map<const meso::HeightLevels*, std::shared_ptr<MesoTexels>> levels;
     std::map<LookKey, std::shared_ptr<MesoTexels>> looks;
     std::vector<Placed> placed;
     for (const MesoSurface& surface : surfaces) {
         Placed made;
         made.remeshed = surface.remeshed;
-        if (made.remeshed.surface) made.number = remeshed_++;
+        if (made.remeshed.surface) {
+            made.number = remeshed_++;
+            const meso::HeightLevels& heights = *made.remeshed.surface->heights;
+            auto& kept = levels[&heights];
+            if (!kept) {
+                VCP_TRY_ASSIGN(auto texels, resources_.words(meso::remeshLevelWords(heights)));
+                kept = std::make_shared<MesoTexels>(std::move(texels));
+            }
+            made.levels = kept;
+        }
         made.arrays = surface.arrays;
         if (surface.arrays) {
             auto& words = uploaded[surface.arrays.get()];
@@ -76,7 +86,7 @@ uint64_t MesoSurfacePass::assetBytes() const {
     uint64_t sum = 0;
     for (const Placed& surface : surfaces_) {
         if (surface.remeshed.surface)
-            sum += surface.remeshed.surface->heights->bytes();
+            bytes[surface.levels.get()] = surface.levels->buffer.bytes();
         else
             bytes[surface.words.get()] = surface.words->buffer.bytes(), sum += surface.shell.buffer.bytes();
         if (surface.look) bytes[surface.look.get()] = surface.look->buffer.bytes();
@@ -152,7 +162,8 @@ Result<void> MesoSurfacePass::prepare(MesoTarget& target, const Picture& picture
         const Placed& surface = surfaces_[i];
         VCP_TRY(choosePipelines(surface, target.drawings[i], request.shading, inScene));
         if (surface.remeshed.surface)
-            VCP_TRY(raster_.remesh(target.remeshed, surface.number, surface.remeshed, remeshLook(request)));
+            VCP_TRY(raster_.remesh(target.remeshed, surface.number, surface.remeshed, *surface.levels,
+                                   remeshLook(request)));
     }
     std::vector<uint32_t> shade{0, 0, 0, 0, 0, 0, 0, inScene ? 1u : 0u};
     if (planes > frame::kMesoPlanes) shade.push_back(frame::kMesoTransferKept);

@@ -74,8 +74,8 @@ public:
         const Buffer* depths;      ///< a float a pixel, world units along the unit ray
         const Buffer* sceneLight;  ///< planes of light; null where surfaces and datasets do not shade each other
     };
-    /// Makes buffers and pipelines, and remeshes. Precondition: there are surfaces, and no frame in flight uses the
-    /// target. Errors: Device, Limit, Unsupported.
+    /// Makes buffers and pipelines, and the pieces of what is remeshed. Precondition: there are surfaces, and no frame
+    /// in flight uses the target. Errors: Device, Limit, Unsupported.
     Result<void> prepare(MesoTarget& target, const Picture& picture, const FrameRequest& request);
     /// Records what finds the hits. Precondition: prepare() with the same picture.
     void recordHits(VkCommandBuffer commands, const MesoTarget& target, const FrameRequest& request,
@@ -97,7 +97,8 @@ private:
         std::shared_ptr<MesoTexels> words, look;  ///< look: null without textures
         MesoTexels shell;
         RemeshedSurface remeshed;
-        size_t number = 0;  ///< among those that are remeshed
+        std::shared_ptr<MesoTexels> levels;  ///< of the heights of what is remeshed
+        size_t number = 0;                   ///< among those that are remeshed
         glm::dvec3 origin;
         frame::MesoView view{};  ///< what does not depend on the picture
         uint32_t textures = 0;

@@ -1,8 +1,6 @@
 #include "render/passes/remesh_raster.h"
 
-#include <algorithm>
 #include <cstddef>
-#include <cstring>
 
 #include <fmt/format.h>
 #include <glm/geometric.hpp>
@@ -18,14 +16,8 @@ namespace {
 using Vertex = meso::RemeshVertex<float>;
 static_assert(sizeof(Vertex) == 32);
 
-constexpr std::array<VkFormat, 2> kColours{VK_FORMAT_R32G32B32A32_SFLOAT, VK_FORMAT_R32G32B32A32_SFLOAT};
 // Nearer than this part of a surface's size to the eye nothing is drawn.
 constexpr double kNearestPart = 1e-5;
-
-/// As remesh_view.glsl has it.
-struct PushedView {
-    glm::vec4 plane, depth, axes[3];
-};
 
 double sizeOf(const meso::RemeshSurface& surface) { return glm::length(surface.high - surface.low); }
 
@@ -55,19 +47,22 @@ Error tooMany(uint64_t pixels, uint64_t most) {
 
 }  // namespace
 
+Result<RasterPipeline> createRemeshPipeline(const Device& device) {
+    return RasterPipeline::create(device, {.vertex = kRemeshVertSpirv,
+                                           .fragment = kRemeshFragSpirv,
+                                           .vertexBytes = sizeof(Vertex),
+                                           .attributes = {{VK_FORMAT_R32G32B32_SFLOAT, offsetof(Vertex, position)},
+                                                          {VK_FORMAT_R32G32B32_SFLOAT, offsetof(Vertex, normal)},
+                                                          {VK_FORMAT_R32G32_SFLOAT, offsetof(Vertex, uv)}},
+                                           .pushBytes = sizeof(RemeshProjection),
+                                           .colours = {kRemeshColours.begin(), kRemeshColours.end()}});
+}
+
 Result<void> RemeshRaster::prepare(RemeshTarget& target, PictureSize size, size_t surfaces) {
     if (!pipeline_.exists()) {
-        VCP_TRY_ASSIGN(pipeline_, RasterPipeline::create(
-                                      device_, {.vertex = kRemeshVertSpirv,
-                                                .fragment = kRemeshFragSpirv,
-                                                .vertexBytes = sizeof(Vertex),
-                                                .attributes = {{VK_FORMAT_R32G32B32_SFLOAT, offsetof(Vertex, position)},
-                                                               {VK_FORMAT_R32G32B32_SFLOAT, offsetof(Vertex, normal)},
-                                                               {VK_FORMAT_R32G32_SFLOAT, offsetof(Vertex, uv)}},
-                                                .pushBytes = sizeof(PushedView),
-                                                .colours = {kColours.begin(), kColours.end()}}));
+        VCP_TRY_ASSIGN(pipeline_, createRemeshPipeline(device_));
     }
-    target.meshes.resize(surfaces);
+    target.drawings.resize(surfaces);
     const VkExtent2D extent{size.width, size.height};
     if (target.images.size().width == extent.width && target.images.size().height == extent.height) return {};
     if (size.pixels() > device_.limits().maxTexelBufferElements)
@@ -79,33 +74,19 @@ Result<void> RemeshRaster::prepare(RemeshTarget& target, PictureSize size, size_
             copy.buffer,
             device_.createBuffer(bytes, VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT,
                                  MemoryUse::Local));
-        VCP_TRY_ASSIGN(copy.view, device_.createTexelView(copy.buffer, kColours[0], bytes));
+        VCP_TRY_ASSIGN(copy.view, device_.createTexelView(copy.buffer, kRemeshColours[0], bytes));
         VCP_TRY_ASSIGN(copy.quads, device_.createTexelView(copy.buffer, VK_FORMAT_R32G32B32A32_UINT, bytes));
     }
-    VCP_TRY_ASSIGN(target.images, RasterTarget::create(device_, pipeline_, kColours, extent));
-    return {};
-}
-
-Result<void> RemeshRaster::upload(Buffer& buffer, std::span<const std::byte> bytes, VkBufferUsageFlags use) const {
-    // It grows by halves, so that a camera's way makes few buffers.
-    if (bytes.size() > buffer.bytes()) {
-        VCP_TRY_ASSIGN(buffer, device_.createBuffer(bytes.size() + bytes.size() / 2, use, MemoryUse::Upload));
-    }
-    if (!bytes.empty()) std::memcpy(buffer.mapped(), bytes.data(), bytes.size());
+    VCP_TRY_ASSIGN(target.images, RasterTarget::create(device_, pipeline_, kRemeshColours, extent));
     return {};
 }
 
 Result<void> RemeshRaster::remesh(RemeshTarget& target, size_t number, const RemeshedSurface& surface,
-                                  const RemeshLook& look) {
-    RemeshBuffers& buffers = target.meshes[number];
-    target.mesh.clear();
-    buffers.indexCount = 0;
-    VCP_TRY(meso::remesh(*surface.surface, cameraOf(*surface.surface, look), surface.options, target.mesh));
-    VCP_TRY(
-        upload(buffers.vertices, std::as_bytes(std::span(target.mesh.vertices)), VK_BUFFER_USAGE_VERTEX_BUFFER_BIT));
-    VCP_TRY(upload(buffers.indices, std::as_bytes(std::span(target.mesh.indices)), VK_BUFFER_USAGE_INDEX_BUFFER_BIT));
-    buffers.indexCount = uint32_t(target.mesh.indices.size());
-    return {};
+                                  const MesoTexels& levels, const RemeshLook& look) {
+    RemeshDrawing& drawing = target.drawings[number];
+    VCP_TRY(meso::makeRemeshPieces(*surface.surface, cameraOf(*surface.surface, look), surface.options, target.pieces));
+    drawing.view = target.pieces.view;
+    return sweep_.prepare(drawing.batches, target.pieces, levels);
 }
 
 void RemeshRaster::record(VkCommandBuffer commands, const RemeshTarget& target, size_t number,
@@ -114,7 +95,7 @@ void RemeshRaster::record(VkCommandBuffer commands, const RemeshTarget& target, 
     const CameraBasis basis = cameraBasis(look.camera, tile.fullWidth, tile.fullHeight);
     const double width = look.size.width, height = look.size.height;
     // Pixels from the left are (x / halfWidth + 1) * fullWidth / 2 - upperLeft.x; from above, with y turned.
-    PushedView projection{};
+    RemeshProjection projection{};
     projection.plane = {tile.fullWidth / basis.halfWidth / width, -(tile.fullHeight / basis.halfHeight / height),
                         (tile.fullWidth - 2 * look.upperLeft.x) / width - 1,
                         (tile.fullHeight - 2 * look.upperLeft.y) / height - 1};
@@ -127,17 +108,18 @@ void RemeshRaster::record(VkCommandBuffer commands, const RemeshTarget& target, 
     }
     const glm::dvec3 axes[3] = {basis.right, basis.up, basis.forward};
     for (int i = 0; i < 3; ++i) projection.axes[i] = glm::vec4(axes[i], 0);
-    const RemeshBuffers& mesh = target.meshes[number];
+    const RemeshDrawing& drawing = target.drawings[number];
     barrierToAll(commands);
+    sweep_.record(commands, drawing.batches, *drawn.heights, drawing.view);
     pipeline_.begin(commands, target.images.framebuffer(), target.images.size());
-    if (mesh.indexCount > 0) {
-        vkCmdPushConstants(commands, pipeline_.layout(), VK_SHADER_STAGE_VERTEX_BIT | VK_SHADER_STAGE_FRAGMENT_BIT, 0,
-                           sizeof projection, &projection);
-        const VkBuffer vertices = mesh.vertices.handle();
+    vkCmdPushConstants(commands, pipeline_.layout(), pipeline_.pushStages(), 0, sizeof projection, &projection);
+    for (const RemeshSwept& batch : drawing.batches) {
+        if (batch.columns == 0) continue;
+        const VkBuffer vertices = batch.vertices.handle();
         const VkDeviceSize start = 0;
         vkCmdBindVertexBuffers(commands, 0, 1, &vertices, &start);
-        vkCmdBindIndexBuffer(commands, mesh.indices.handle(), 0, VK_INDEX_TYPE_UINT32);
-        vkCmdDrawIndexed(commands, mesh.indexCount, 1, 0, 0, 0);
+        vkCmdBindIndexBuffer(commands, batch.indices.handle(), 0, VK_INDEX_TYPE_UINT32);
+        vkCmdDrawIndexedIndirect(commands, batch.drawn.handle(), 0, 1, 0);
     }
     vkCmdEndRenderPass(commands);
     for (size_t i = 0; i < target.copies.size(); ++i) target.images.copy(commands, i, target.copies[i].buffer);

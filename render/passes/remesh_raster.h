@@ -1,8 +1,8 @@
-// Draws remeshed surfaces (mesostructure/remesh/remesher.h): the processor remeshes the surface for the view, the
-// device rasterizes the triangles into images of the picture's size, and a compute pass takes those of their pixels
-// into the mesostructure's hits that are nearer (shaders/remesh.vert, remesh.frag, remesh_merge.comp).
+// Draws remeshed surfaces (mesostructure/remesh/remesher.h): the device sweeps their pieces for the view
+// (passes/remesh_sweep.h) and rasterizes the triangles into images of the picture's size; a compute pass takes those of
+// their pixels into the mesostructure's hits that are nearer (shaders/remesh.vert, remesh.frag, remesh_merge.comp).
 //
-// Reads vertices, hits; writes images, hits. Barriers are recorded here; begins and ends with barrierToAll.
+// Reads levels, pieces, hits; writes images, hits. Barriers are recorded here; begins and ends with barrierToAll.
 #pragma once
 
 #include <array>
@@ -11,6 +11,7 @@
 #include "render/meso_surface.h"
 #include "render/passes/frame_resources.h"
 #include "render/passes/meso_resources.h"
+#include "render/passes/remesh_sweep.h"
 #include "render/vulkan/raster_pipeline.h"
 
 namespace vcp {
@@ -23,37 +24,47 @@ struct RemeshLook {
     PictureSize size;
 };
 
-/// The mesh of one surface in one frame.
-struct RemeshBuffers {
-    Buffer vertices, indices;
-    uint32_t indexCount = 0;
+/// What remesh.vert and remesh.frag are pushed (shaders/remesh_view.glsl).
+struct RemeshProjection {
+    glm::vec4 plane, depth, axes[3];
+};
+
+/// Makes the pipeline that draws what was remeshed: depth along the unit ray with the place in the tile, and normals.
+/// Errors: as RasterPipeline::create.
+Result<RasterPipeline> createRemeshPipeline(const Device& device);
+inline constexpr std::array<VkFormat, 2> kRemeshColours{VK_FORMAT_R32G32B32A32_SFLOAT, VK_FORMAT_R32G32B32A32_SFLOAT};
+
+/// One surface in one frame.
+struct RemeshDrawing {
+    std::vector<RemeshSwept> batches;
+    meso::RemeshMath<float>::RemeshView view{};
 };
 
 /// What a frame's remeshed surfaces are drawn into, one after the other.
 struct RemeshTarget {
     RasterTarget images;
     std::array<MesoTexels, 2> copies;  ///< hits and normals, as remesh.frag writes them
-    std::vector<RemeshBuffers> meshes;
-    meso::RemeshMesh<float> mesh;  ///< of the last surface; kept for its memory
+    std::vector<RemeshDrawing> drawings;
+    meso::RemeshPieces pieces;  ///< of the last surface; kept for its memory
 };
 
 class RemeshRaster {
 public:
-    explicit RemeshRaster(Device& device) : device_(device) {}
+    explicit RemeshRaster(Device& device) : device_(device), sweep_(device) {}
 
     /// Makes the images. Errors: Device; Limit; Unsupported, as RasterPipeline::create.
     Result<void> prepare(RemeshTarget& target, PictureSize size, size_t surfaces);
-    /// Remeshes a surface for a view. Precondition: no frame in flight uses the target. Errors: Device; those of
-    /// meso::remesh.
-    Result<void> remesh(RemeshTarget& target, size_t number, const RemeshedSurface& surface, const RemeshLook& look);
-    /// Draws a surface into the images and copies them.
+    /// Makes and uploads the pieces of a surface for a view. `levels`: meso::remeshLevelWords() of its heights.
+    /// Precondition: no frame in flight uses the target. Errors: Device; those of meso::makeRemeshPieces.
+    Result<void> remesh(RemeshTarget& target, size_t number, const RemeshedSurface& surface, const MesoTexels& levels,
+                        const RemeshLook& look);
+    /// Sweeps a surface's pieces, draws them into the images and copies these.
     void record(VkCommandBuffer commands, const RemeshTarget& target, size_t number, const RemeshedSurface& surface,
                 const RemeshLook& look) const;
 
 private:
-    Result<void> upload(Buffer& buffer, std::span<const std::byte> bytes, VkBufferUsageFlags use) const;
-
     Device& device_;
+    RemeshSweepPass sweep_;
     RasterPipeline pipeline_;
 };
 

@@ -49,27 +49,39 @@ Result<RasterPipeline> RasterPipeline::create(const Device& device, const Raster
     made.device_ = device.handle();
     made.colours_ = uint32_t(options.colours.size());
     VCP_TRY(made.createPass(options));
-    const VkPushConstantRange push{VK_SHADER_STAGE_VERTEX_BIT | VK_SHADER_STAGE_FRAGMENT_BIT, 0, options.pushBytes};
+    std::vector<std::pair<VkShaderStageFlagBits, std::span<const uint32_t>>> codes{
+        {VK_SHADER_STAGE_VERTEX_BIT, options.vertex}, {VK_SHADER_STAGE_FRAGMENT_BIT, options.fragment}};
+    if (!options.control.empty()) {
+        codes.emplace_back(VK_SHADER_STAGE_TESSELLATION_CONTROL_BIT, options.control);
+        codes.emplace_back(VK_SHADER_STAGE_TESSELLATION_EVALUATION_BIT, options.evaluation);
+    }
+    for (const auto& [stage, code] : codes) made.pushStages_ |= stage;
+    const VkPushConstantRange push{made.pushStages_, 0, options.pushBytes};
     VkPipelineLayoutCreateInfo layout{VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO};
+    layout.setLayoutCount = options.set != VK_NULL_HANDLE ? 1 : 0;
+    layout.pSetLayouts = &options.set;
     layout.pushConstantRangeCount = 1;
     layout.pPushConstantRanges = &push;
     VCP_VK(vkCreatePipelineLayout, device.handle(), &layout, nullptr, &made.layout_);
-    VkShaderModule modules[2] = {};
+    std::vector<VkPipelineShaderStageCreateInfo> stages;
     const auto free = [&] {
-        for (VkShaderModule module : modules) vkDestroyShaderModule(device.handle(), module, nullptr);
+        for (const auto& stage : stages) vkDestroyShaderModule(device.handle(), stage.module, nullptr);
     };
-    const std::span<const uint32_t> codes[2] = {options.vertex, options.fragment};
-    for (int i = 0; i < 2; ++i) {
+    for (const auto& [stage, code] : codes) {
         VkShaderModuleCreateInfo info{VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO};
-        info.codeSize = codes[i].size_bytes();
-        info.pCode = codes[i].data();
-        if (const VkResult result = vkCreateShaderModule(device.handle(), &info, nullptr, &modules[i]);
+        info.codeSize = code.size_bytes();
+        info.pCode = code.data();
+        VkPipelineShaderStageCreateInfo used{VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO};
+        used.stage = stage;
+        used.pName = "main";
+        if (const VkResult result = vkCreateShaderModule(device.handle(), &info, nullptr, &used.module);
             result != VK_SUCCESS) {
             free();
             return vulkanError("vkCreateShaderModule", result);
         }
+        stages.push_back(used);
     }
-    const auto created = made.createPipeline(device, options, modules[0], modules[1]);
+    const auto created = made.createPipeline(device, options, stages);
     free();
     if (!created) return created.error();
     return made;
@@ -129,25 +141,21 @@ Result<void> RasterPipeline::createPass(const RasterPipelineOptions& options) {
 }
 
 Result<void> RasterPipeline::createPipeline(const Device& device, const RasterPipelineOptions& options,
-                                            VkShaderModule vertex, VkShaderModule fragment) {
-    VkPipelineShaderStageCreateInfo stages[2] = {};
-    for (int i = 0; i < 2; ++i) {
-        stages[i].sType = VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO;
-        stages[i].stage = i == 0 ? VK_SHADER_STAGE_VERTEX_BIT : VK_SHADER_STAGE_FRAGMENT_BIT;
-        stages[i].module = i == 0 ? vertex : fragment;
-        stages[i].pName = "main";
-    }
+                                            std::span<const VkPipelineShaderStageCreateInfo> stages) {
     const VkVertexInputBindingDescription binding{0, options.vertexBytes, VK_VERTEX_INPUT_RATE_VERTEX};
     std::vector<VkVertexInputAttributeDescription> attributes;
     for (const auto& [format, offset] : options.attributes)
         attributes.push_back({uint32_t(attributes.size()), 0, format, offset});
     VkPipelineVertexInputStateCreateInfo input{VK_STRUCTURE_TYPE_PIPELINE_VERTEX_INPUT_STATE_CREATE_INFO};
-    input.vertexBindingDescriptionCount = 1;
+    input.vertexBindingDescriptionCount = attributes.empty() ? 0 : 1;
     input.pVertexBindingDescriptions = &binding;
     input.vertexAttributeDescriptionCount = uint32_t(attributes.size());
     input.pVertexAttributeDescriptions = attributes.data();
     VkPipelineInputAssemblyStateCreateInfo assembly{VK_STRUCTURE_TYPE_PIPELINE_INPUT_ASSEMBLY_STATE_CREATE_INFO};
-    assembly.topology = VK_PRIMITIVE_TOPOLOGY_TRIANGLE_LIST;
+    assembly.topology =
+        options.control.empty() ? VK_PRIMITIVE_TOPOLOGY_TRIANGLE_LIST : VK_PRIMITIVE_TOPOLOGY_PATCH_LIST;
+    VkPipelineTessellationStateCreateInfo patches{VK_STRUCTURE_TYPE_PIPELINE_TESSELLATION_STATE_CREATE_INFO};
+    patches.patchControlPoints = 3;
     VkPipelineViewportStateCreateInfo viewport{VK_STRUCTURE_TYPE_PIPELINE_VIEWPORT_STATE_CREATE_INFO};
     viewport.viewportCount = viewport.scissorCount = 1;
     VkPipelineRasterizationStateCreateInfo raster{VK_STRUCTURE_TYPE_PIPELINE_RASTERIZATION_STATE_CREATE_INFO};
@@ -171,10 +179,11 @@ Result<void> RasterPipeline::createPipeline(const Device& device, const RasterPi
     dynamic.dynamicStateCount = 2;
     dynamic.pDynamicStates = states;
     VkGraphicsPipelineCreateInfo info{VK_STRUCTURE_TYPE_GRAPHICS_PIPELINE_CREATE_INFO};
-    info.stageCount = 2;
-    info.pStages = stages;
+    info.stageCount = uint32_t(stages.size());
+    info.pStages = stages.data();
     info.pVertexInputState = &input;
     info.pInputAssemblyState = &assembly;
+    if (!options.control.empty()) info.pTessellationState = &patches;
     info.pViewportState = &viewport;
     info.pRasterizationState = &raster;
     info.pMultisampleState = &samples;
@@ -207,6 +216,16 @@ void RasterPipeline::begin(VkCommandBuffer commands, VkFramebuffer target, VkExt
     const VkViewport viewport{0, 0, float(size.width), float(size.height), 0, 1};
     vkCmdSetViewport(commands, 0, 1, &viewport);
     vkCmdSetScissor(commands, 0, 1, &info.renderArea);
+}
+
+void barrierComputeToDraw(VkCommandBuffer commands) {
+    VkMemoryBarrier memory{VK_STRUCTURE_TYPE_MEMORY_BARRIER};
+    memory.srcAccessMask = VK_ACCESS_SHADER_WRITE_BIT;
+    memory.dstAccessMask =
+        VK_ACCESS_INDIRECT_COMMAND_READ_BIT | VK_ACCESS_INDEX_READ_BIT | VK_ACCESS_VERTEX_ATTRIBUTE_READ_BIT;
+    vkCmdPipelineBarrier(commands, VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT,
+                         VK_PIPELINE_STAGE_DRAW_INDIRECT_BIT | VK_PIPELINE_STAGE_VERTEX_INPUT_BIT, 0, 1, &memory, 0,
+                         nullptr, 0, nullptr);
 }
 
 Result<RasterTarget> RasterTarget::create(const Device& device, const RasterPipeline& pipeline,

@@ -39,14 +39,17 @@ private:
 };
 
 struct RasterPipelineOptions {
-    std::span<const uint32_t> vertex, fragment;  ///< SPIR-V
+    std::span<const uint32_t> vertex, fragment;     ///< SPIR-V
+    std::span<const uint32_t> control, evaluation;  ///< the same, of patches of three points; empty: triangles
     uint32_t vertexBytes = 0;
     std::vector<std::pair<VkFormat, uint32_t>> attributes;  ///< format and byte of each location
-    uint32_t pushBytes = 0;                                 ///< of both stages
+    uint32_t pushBytes = 0;                                 ///< of all stages
+    VkDescriptorSetLayout set = VK_NULL_HANDLE;             ///< set 0, not owned; null: none
     std::vector<VkFormat> colours;
 };
 
-/// Triangle lists; the greater depth is nearer; both faces are drawn. Move-only; destroyed before the device.
+/// Triangle lists, or patches; the greater depth is nearer; both faces are drawn. Move-only; destroyed before the
+/// device.
 class RasterPipeline {
 public:
     static constexpr VkFormat kDepth = VK_FORMAT_D32_SFLOAT;
@@ -59,12 +62,13 @@ public:
     RasterPipeline& operator=(RasterPipeline&& other) noexcept {
         std::swap(device_, other.device_), std::swap(pass_, other.pass_);
         std::swap(layout_, other.layout_), std::swap(pipeline_, other.pipeline_);
-        std::swap(colours_, other.colours_);
+        std::swap(colours_, other.colours_), std::swap(pushStages_, other.pushStages_);
         return *this;
     }
     [[nodiscard]] bool exists() const { return pipeline_ != VK_NULL_HANDLE; }
     [[nodiscard]] VkPipelineLayout layout() const { return layout_; }
     [[nodiscard]] VkRenderPass pass() const { return pass_; }
+    [[nodiscard]] VkShaderStageFlags pushStages() const { return pushStages_; }
 
     /// Begins the pass with all cleared to 0, and binds the pipeline. The colours' images are to be copied from after
     /// vkCmdEndRenderPass.
@@ -72,15 +76,19 @@ public:
 
 private:
     Result<void> createPass(const RasterPipelineOptions& options);
-    Result<void> createPipeline(const Device& device, const RasterPipelineOptions& options, VkShaderModule vertex,
-                                VkShaderModule fragment);
+    Result<void> createPipeline(const Device& device, const RasterPipelineOptions& options,
+                                std::span<const VkPipelineShaderStageCreateInfo> stages);
 
     VkDevice device_ = VK_NULL_HANDLE;
     VkRenderPass pass_ = VK_NULL_HANDLE;
     VkPipelineLayout layout_ = VK_NULL_HANDLE;
     VkPipeline pipeline_ = VK_NULL_HANDLE;
+    VkShaderStageFlags pushStages_ = 0;
     uint32_t colours_ = 0;
 };
+
+/// Makes what compute shaders wrote visible to draws, as vertices, indices and indirect commands.
+void barrierComputeToDraw(VkCommandBuffer commands);
 
 /// The images of a picture's size that a pipeline draws into. Move-only; destroyed before the device.
 class RasterTarget {

@@ -425,7 +425,10 @@ Result<BenchMesoReport> benchMeso(const BenchMesoOptions& options) {
         report.published.insert(report.published.end(), remeshed.begin(), remeshed.end());
     }
     if (options.remesh) {
-        VCP_TRY_ASSIGN(report.remeshed, benchRemesh(assets));
+        VCP_TRY_ASSIGN(report.remeshed, benchRemesh(assets, options.device));
+        if (options.tessellation) {
+            VCP_TRY_ASSIGN(report.remeshedPictures, benchTessellation(assets, options.device.value_or("")));
+        }
     }
     return report;
 }

@@ -27,7 +27,7 @@ struct BenchMesoOptions {
     std::vector<std::string> assets;
     std::vector<std::string> methods;   ///< empty: all that fit the asset
     std::vector<std::string> views;     ///< empty: all
-    std::optional<std::string> device;  ///< march there, as RendererOptions::device; absent: on the CPU
+    std::optional<std::string> device;  ///< march and remesh there, as RendererOptions::device; absent: on the CPU
     bool sweep = false;                 ///< each method at several values of its knob
     int rays = 2000;                    ///< a view
     int repetitions = 3;                ///< rounds over the methods
@@ -35,6 +35,7 @@ struct BenchMesoOptions {
     bool factors = false;               ///< compares the factors of displacement maps
     bool light = false;                 ///< compares light from everywhere on a tile with a path tracer
     bool remesh = false;                ///< measures remeshing as well (bench_remesh.h)
+    bool tessellation = false;          ///< beside the sweep, by the device's tessellator
     uint64_t checkRays = 0;             ///< rays of the conservative test for each asset; 0: not made
     /// Called with what is being done; false cancels. May be empty.
     std::function<bool(const std::string&, double fraction)> progress;
@@ -135,12 +136,24 @@ struct RemeshRow {
     double bias = 0;                   ///< mean height above the surface's, half quad edges
     double horizonLoss = 0;            ///< pixels that the horizon is lower, mean
     uint64_t vertices = 0, triangles = 0, bytes = 0;
-    double ms = 0;  ///< of one frame's remeshing, one thread, median
+    double ms = 0;            ///< of one frame's remeshing on the processor, one thread, median
+    std::string device = {};  ///< that remeshes as well; empty: none
+    double piecesMs = 0, sweepMs = 0, sweepProcessorMs = 0;  ///< as RemeshTimes
+};
+
+/// One view of a remeshed height field, drawn by a device: errors are those of its pixels (bench_remesh.h).
+struct RemeshDrawnRow {
+    std::string asset, view, way;
+    double cell = 1;                   ///< pixels
+    double p50 = 0, p95 = 0, max = 0;  ///< of the error, pixels
+    uint64_t pixels = 0, vertices = 0, triangles = 0;
+    double ms = 0, processorMs = 0;  ///< as RemeshDrawn
 };
 
 struct BenchMesoReport {
     std::vector<BenchMesoRow> rows;
     std::vector<RemeshRow> remeshed;
+    std::vector<RemeshDrawnRow> remeshedPictures;
     std::vector<MesoCheck> checks;
     std::vector<MesoPublished> published;
     std::vector<MesoFactors> factors;

@@ -231,9 +231,28 @@ std::string benchMesoJson(const BenchMesoReport& report) {
                             {"vertices", row.vertices},
                             {"triangles", row.triangles},
                             {"bytes", row.bytes},
-                            {"ms", row.ms}});
-    return Json{{"rows", rowsOf(report)}, {"headline", headlines}, {"checks", checks},    {"published", published},
-                {"factors", factors},     {"lights", lights},      {"remeshed", remeshed}}
+                            {"ms", row.ms},
+                            {"device", row.device},
+                            {"pieces_ms", row.piecesMs},
+                            {"sweep_ms", row.sweepMs},
+                            {"sweep_processor_ms", row.sweepProcessorMs}});
+    Json pictures = Json::array();
+    for (const RemeshDrawnRow& row : report.remeshedPictures)
+        pictures.push_back({{"asset", row.asset},
+                            {"view", row.view},
+                            {"way", row.way},
+                            {"cell_pixels", row.cell},
+                            {"error_p50_pixels", row.p50},
+                            {"error_p95_pixels", row.p95},
+                            {"error_max_pixels", row.max},
+                            {"pixels", row.pixels},
+                            {"vertices", row.vertices},
+                            {"triangles", row.triangles},
+                            {"ms", row.ms},
+                            {"processor_ms", row.processorMs}});
+    return Json{{"rows", rowsOf(report)}, {"headline", headlines},        {"checks", checks},
+                {"published", published}, {"factors", factors},           {"lights", lights},
+                {"remeshed", remeshed},   {"remeshed_pictures", pictures}}
         .dump();
 }
 
@@ -294,12 +313,24 @@ std::string benchMesoMarkdown(const BenchMesoReport& report) {
         text +=
             "\n| remeshed | view | filter | cell px | error p50 | p95 | max px | certified px | bias | horizon lower "
             "by px "
-            "| vertices | ms |\n|---|---|---|---|---|---|---|---|---|---|---|---|\n";
+            "| vertices | ms | on a device: pieces | sweep | its processor ms "
+            "|\n|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n";
         for (const RemeshRow& row : report.remeshed)
             text += fmt::format(
-                "| {} | {} | {} | {:g} | {:.3f} | {:.3f} | {:.2f} | {:.2f} | {:+.5f} | {:+.2f} | {} | {:.1f} |\n",
+                "| {} | {} | {} | {:g} | {:.3f} | {:.3f} | {:.2f} | {:.2f} | {:+.5f} | {:+.2f} | {} | {:.1f} | {:.2f} "
+                "| {:.1f} | "
+                "{:.1f} |\n",
                 row.asset, row.view, row.filter, row.cell, row.p50, row.p95, row.max, row.boundPixels, row.bias,
-                row.horizonLoss, row.vertices, row.ms);
+                row.horizonLoss, row.vertices, row.ms, row.piecesMs, row.sweepMs, row.sweepProcessorMs);
+    }
+    if (!report.remeshedPictures.empty()) {
+        text +=
+            "\n| drawn | view | way | cell px | error p50 | p95 | max px | pixels | vertices | triangles | ms | "
+            "processor ms |\n|---|---|---|---|---|---|---|---|---|---|---|---|\n";
+        for (const RemeshDrawnRow& row : report.remeshedPictures)
+            text += fmt::format("| {} | {} | {} | {:g} | {:.3f} | {:.3f} | {:.2f} | {} | {} | {} | {:.1f} | {:.1f} |\n",
+                                row.asset, row.view, row.way, row.cell, row.p50, row.p95, row.max, row.pixels,
+                                row.vertices, row.triangles, row.ms, row.processorMs);
     }
     if (report.checks.empty()) return text;
     text += "\n| asset | map | rays | oversteps | worst, texels |\n|---|---|---|---|---|\n";

@@ -11,6 +11,7 @@
 
 #include "mesostructure/remesh/remesher.h"
 #include "mesostructure/solids.h"
+#include "render/remesh_meter.h"
 #include "viewer/scene/meso_scene.h"
 
 namespace vcp {
@@ -147,12 +148,52 @@ void judge(const RemeshMesh<double>& mesh, const Truth& truth, const Horizon& ho
     row.horizonLoss = horizon.lossOf(ours);
 }
 
+void judgePixels(const std::vector<glm::vec4>& hits, const Truth& truth, const RemeshCamera& camera,
+                 RemeshDrawnRow& row) {
+    std::vector<double> errors;
+    for (size_t i = 0; i < hits.size(); ++i) {
+        if (hits[i].w == 0) continue;
+        const dvec2 at(double(i % size_t(kWidth)) + 0.5, double(i / size_t(kWidth)) + 0.5);
+        const dvec2 tangents(glm::mix(camera.seen.x, camera.seen.z, at.x / kWidth),
+                             glm::mix(camera.seen.w, camera.seen.y, at.y / kHeight));
+        const dvec3 there = truth.eyeSpace(dvec2(hits[i].y, hits[i].z));
+        if (there.z < 0.01) continue;
+        errors.push_back(glm::distance(camera.focal * tangents, truth.pixel(there)));
+    }
+    row.pixels = errors.size();
+    if (errors.empty()) return;
+    std::ranges::sort(errors);
+    row.p50 = errors[errors.size() / 2], row.p95 = errors[size_t(0.95 * double(errors.size() - 1))];
+    row.max = errors.back();
+}
+
 double seconds(std::chrono::steady_clock::time_point since) {
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - since).count();
 }
 
+/// Times one thread of the processor, and the device where there is one.
+Result<void> timeFrame(const RemeshSurface& surface, const RemeshCamera& camera, const RemeshOptions& options,
+                       RemeshMeter* meter, RemeshRow& row) {
+    std::array<double, kRounds> times{};
+    RemeshMesh<float> drawn;
+    for (double& time : times) {
+        drawn.clear();
+        const auto start = std::chrono::steady_clock::now();
+        VCP_TRY(remesh(surface, camera, options, drawn));
+        time = seconds(start);
+    }
+    std::ranges::sort(times);
+    row.ms = 1e3 * times[kRounds / 2];
+    row.vertices = drawn.vertices.size(), row.triangles = drawn.indices.size() / 3, row.bytes = drawn.bytes();
+    if (meter == nullptr) return {};
+    VCP_TRY_ASSIGN(const auto there, meter->measure(surface, camera, options, kRounds));
+    row.device = meter->device().name;
+    row.piecesMs = there.piecesMs, row.sweepMs = there.sweepMs, row.sweepProcessorMs = there.sweepProcessorMs;
+    return {};
+}
+
 Result<void> measure(const std::string& name, const HeightMap& map, const BaseSurface& quad, const Filter& filter,
-                     std::vector<RemeshRow>& rows) {
+                     RemeshMeter* meter, std::vector<RemeshRow>& rows) {
     // The printed fit takes hundreds of steps; it is measured where it ends.
     VCP_TRY_ASSIGN(auto built, HeightLevels::build(map, {.fit = filter.fit}));
     const auto levels = std::make_shared<const HeightLevels>(std::move(built));
@@ -171,17 +212,7 @@ Result<void> measure(const std::string& name, const HeightMap& map, const BaseSu
             VCP_TRY(remesh(surface, camera, bounded, mesh));
             row.boundPixels = mesh.counts.boundPixels;
             judge(mesh, truth, horizon, row);
-            std::array<double, kRounds> times{};
-            RemeshMesh<float> drawn;
-            for (double& time : times) {
-                drawn.clear();
-                const auto start = std::chrono::steady_clock::now();
-                VCP_TRY(remesh(surface, camera, options, drawn));
-                time = seconds(start);
-            }
-            std::ranges::sort(times);
-            row.ms = 1e3 * times[kRounds / 2];
-            row.vertices = drawn.vertices.size(), row.triangles = drawn.indices.size() / 3, row.bytes = drawn.bytes();
+            VCP_TRY(timeFrame(surface, camera, options, meter, row));
             rows.push_back(row);
         }
     }
@@ -190,13 +221,47 @@ Result<void> measure(const std::string& name, const HeightMap& map, const BaseSu
 
 }  // namespace
 
-Result<std::vector<RemeshRow>> benchRemesh(const std::vector<std::string>& assets) {
+Result<std::vector<RemeshRow>> benchRemesh(const std::vector<std::string>& assets,
+                                           const std::optional<std::string>& device) {
     VCP_TRY_ASSIGN(const auto quad, makeBaseSurface("quad", 1));
+    std::unique_ptr<RemeshMeter> meter;
+    if (device) {
+        VCP_TRY_ASSIGN(meter, RemeshMeter::create(*device));
+    }
     std::vector<RemeshRow> rows;
     for (const std::string& name : assets) {
         VCP_TRY_ASSIGN(const auto asset, openMesoAsset(name));
         if (!asset.heights) continue;
-        for (const Filter& filter : kFilters) VCP_TRY(measure(name, *asset.heights, quad, filter, rows));
+        for (const Filter& filter : kFilters) VCP_TRY(measure(name, *asset.heights, quad, filter, meter.get(), rows));
+    }
+    return rows;
+}
+
+Result<std::vector<RemeshDrawnRow>> benchTessellation(const std::vector<std::string>& assets,
+                                                      const std::string& device) {
+    VCP_TRY_ASSIGN(const auto quad, makeBaseSurface("quad", 1));
+    VCP_TRY_ASSIGN(const auto meter, RemeshMeter::create(device));
+    std::vector<RemeshDrawnRow> rows;
+    for (const std::string& name : assets) {
+        VCP_TRY_ASSIGN(const auto asset, openMesoAsset(name));
+        if (!asset.heights) continue;
+        VCP_TRY_ASSIGN(auto built, HeightLevels::build(*asset.heights));
+        const auto levels = std::make_shared<const HeightLevels>(std::move(built));
+        const double height = 2 * asset.heights->range;
+        VCP_TRY_ASSIGN(const auto surface, buildRemeshSurface(quad, levels, height));
+        for (const Place& place : kPlaces)
+            for (const double cell : {1.0, 5.0, 20.0})
+                for (const auto& [way, text] :
+                     {std::pair(RemeshWay::Sweep, "sweep"), std::pair(RemeshWay::Tessellation, "tessellation")}) {
+                    const RemeshCamera camera = cameraAt(place);
+                    VCP_TRY_ASSIGN(const auto drawn, meter->draw(surface, camera, {.cell = cell}, way, uint32_t(kWidth),
+                                                                 uint32_t(kHeight), kRounds));
+                    RemeshDrawnRow row{.asset = name, .view = place.name, .way = text, .cell = cell};
+                    judgePixels(drawn.hits, Truth(*levels, height, camera), camera, row);
+                    row.vertices = drawn.vertices, row.triangles = drawn.triangles;
+                    row.ms = drawn.ms, row.processorMs = drawn.processorMs;
+                    rows.push_back(row);
+                }
     }
     return rows;
 }

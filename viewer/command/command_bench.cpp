@@ -53,10 +53,13 @@ struct StreamCommand {
 };
 
 constexpr const char* kBestDevice = "best";
+constexpr const char* kSweep = "sweep";
+constexpr const char* kTessellation = "tessellation";
 
 struct MesoCommand {
     BenchMesoOptions options;
     std::string device;  ///< empty: the CPU
+    std::string remesh;  ///< empty: it is not measured
     BenchCommand bench;
 };
 
@@ -150,6 +153,7 @@ Result<int> runMeso(const MesoCommand& command) {
     VCP_TRY(makeFolder(command.bench.out));
     BenchMesoOptions options = command.options;
     if (!command.device.empty()) options.device = command.device == kBestDevice ? "" : command.device;
+    options.remesh = !command.remesh.empty(), options.tessellation = command.remesh == kTessellation;
     VCP_TRY_ASSIGN(const auto report, runShown(command.bench, benchMeso, options, options.progress));
     return publish(command.bench, "bench_meso",
                    {benchMesoJson(report), benchMesoCsv(report), benchMesoMarkdown(report), benchMesoPlots(report)});
@@ -290,10 +294,15 @@ RunCommand addBenchMeso(CLI::App& bench) {
                   "Also compare light from everywhere on a tile, in the three skies, with a path tracer");
     app->add_flag("--published", options.published,
                   "Beside the ratios of the paper's tables (with --sweep, for those of times)");
-    app->add_flag("--remesh", options.remesh,
-                  "Remeshing of the height fields as well: error in pixels, vertices and time, by cell and filter");
+    app->add_option("--remesh", command->remesh,
+                    "Remeshing of the height fields as well: error in pixels, vertices and time, by cell and filter; "
+                    "sweep, or tessellation: beside it, by a device's tessellator [sweep]")
+        ->type_name("WAY")
+        ->expected(0, 1)
+        ->default_str(kSweep)
+        ->check(CLI::IsMember({kSweep, kTessellation}));
     app->add_option("--device", command->device,
-                    "March on a Vulkan device: an index or a part of a name, or without one the best [on the CPU]")
+                    "March and remesh on a Vulkan device: an index or a part of a name; without one the best [the CPU]")
         ->type_name("DEVICE")
         ->expected(0, 1)
         ->default_str(kBestDevice);

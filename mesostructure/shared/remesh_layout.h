@@ -1,0 +1,15 @@
+// How the pieces and levels of a remeshed surface are stored for devices: as texels of four words
+// (mesostructure/remesh/remesh_pieces.h writes them, render/shaders/remesh_piece.glsl reads them).
+//
+// quad      of a piece
+//  0 to  2  corners: position, 1 / depth
+//  3 to  5  corners: direction, texels a world unit
+//  6 to  8  corners: cell of the grid, height
+//  9, 10    coordinates of corners 0, 1, 2; bit k: edge k has a seam; unused
+// 11 to 13  seams: coordinates of the edge's other side, at its start and its end
+// 14 to 17  frame: by u, turned; by v; direction by u; direction by v
+// 18        frame: the triangle's own normal
+//
+// Of the levels a quad each: the word at which its heights begin, its width and height, its texels in a tile unit along
+// y; then the heights.
+CONSTANT uint kRemeshPieceQuads = 19u;

@@ -1,0 +1,56 @@
+// Sweeps the pieces of remeshed surfaces on the device (mesostructure/shared/remesh_sweep.h): counts the vertices and
+// indices of each column of grid points, adds the counts up, and writes both to where they are drawn from
+// (shaders/remesh_count.comp, remesh_scan.comp, remesh_emit.comp). The processor culls, halves and uploads pieces
+// (mesostructure/remesh/remesh_pieces.h); how much room a piece needs it knows without counting, so it waits for
+// nothing.
+//
+// Reads levels and pieces; writes vertices, indices and what is drawn. record() ends with barrierComputeToDraw; before
+// it nothing may read the buffers any more.
+#pragma once
+
+#include <vector>
+
+#include "mesostructure/remesh/remesh_pieces.h"
+#include "render/passes/meso_resources.h"
+#include "render/vulkan/compute_pipeline.h"
+#include "render/vulkan/device.h"
+
+namespace vcp {
+
+/// A batch of pieces in one frame. What is drawn: VkDrawIndexedIndirectCommand, and the number of vertices.
+struct RemeshSwept {
+    Buffer quads, firstColumns;  ///< uploaded
+    TexelView quadsView, firstColumnsView;
+    Buffer counts, drawn, vertices, indices;
+    MesoSet set;
+    uint32_t pieces = 0, columns = 0;
+};
+
+class RemeshSweepPass {
+public:
+    explicit RemeshSweepPass(Device& device) : device_(device) {}
+    ~RemeshSweepPass();
+    RemeshSweepPass(const RemeshSweepPass&) = delete;
+    RemeshSweepPass& operator=(const RemeshSweepPass&) = delete;
+
+    /// Uploads the pieces, and makes room for what they become; batches that are no longer used keep theirs.
+    /// `levels`: remeshLevelWords(). Precondition: no frame in flight uses the batches. Errors: Device.
+    Result<void> prepare(std::vector<RemeshSwept>& swept, const meso::RemeshPieces& pieces, const MesoTexels& levels);
+    /// Records the sweep. Precondition: prepare() with the same pieces.
+    void record(VkCommandBuffer commands, const std::vector<RemeshSwept>& swept, const meso::HeightLevels& heights,
+                const meso::RemeshMath<float>::RemeshView& view) const;
+
+private:
+    Result<void> createPipelines();
+    Result<MesoSet> createSet() const;
+    Result<bool> grow(Buffer& buffer, uint64_t bytes, VkBufferUsageFlags usage, MemoryUse use) const;
+    Result<void> upload(RemeshSwept& swept, const meso::RemeshBatch& batch) const;
+    void writeSet(const RemeshSwept& swept, const MesoTexels& levels) const;
+
+    Device& device_;
+    VkDescriptorSetLayout setLayout_ = VK_NULL_HANDLE;
+    VkPipelineLayout layout_ = VK_NULL_HANDLE;
+    ComputePipeline count_, scan_, emit_;
+};
+
+}  // namespace vcp

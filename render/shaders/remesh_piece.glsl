@@ -1,0 +1,69 @@
+// A piece of a remeshed surface, by the shared maths: what the sweep (remesh_columns.glsl) and patches
+// (remesh_patch.glsl) have in common. Whoever includes this has pushed `view`, `levels` and `mapWidth`, and has
+// remeshAddVertex and remeshAddTriangle (mesostructure/shared/remesh_sweep.h).
+layout(set = 0, binding = 0) uniform utextureBuffer levelWords;
+layout(set = 0, binding = 1) uniform utextureBuffer levelQuads;
+layout(set = 0, binding = 2) uniform utextureBuffer pieceQuads;
+
+uint firstPieceQuad;  // of the invocation's piece
+
+uvec4 pieceQuad(int i) { return texelFetch(pieceQuads, int(firstPieceQuad) + i); }
+vec4 pieceReals(int i) { return uintBitsToFloat(pieceQuad(i)); }
+
+ivec3 remeshCell(int k) { return ivec3(pieceQuad(6 + k).xyz); }
+
+RemeshCorner remeshCorner(int k) {
+    vec4 position = pieceReals(k), direction = pieceReals(3 + k), uvs = pieceReals(k < 2 ? 9 : 10);
+    uvec4 cell = pieceQuad(6 + k);
+    RemeshCorner corner;
+    corner.position = position.xyz;
+    corner.direction = direction.xyz;
+    corner.grid = ivec3(cell.xyz);
+    corner.uv = k == 1 ? uvs.zw : uvs.xy;
+    corner.density = direction.w;
+    corner.height = uintBitsToFloat(cell.w);
+    corner.weight = position.w;
+    return corner;
+}
+
+RemeshSeam remeshSeam(int k) {
+    vec4 beyond = pieceReals(11 + k);
+    RemeshSeam seam;
+    seam.is = (pieceQuad(10).z >> uint(k) & 1u) != 0u;
+    seam.start = beyond.xy;
+    seam.end = beyond.zw;
+    return seam;
+}
+
+RemeshFrame remeshFrame() {
+    vec4 byU = pieceReals(14);
+    RemeshFrame frame;
+    frame.byU = byU.xyz;
+    frame.byV = pieceReals(15).xyz;
+    frame.directionByU = pieceReals(16).xyz;
+    frame.directionByV = pieceReals(17).xyz;
+    frame.facet = pieceReals(18).xyz;
+    frame.turned = byU.w;
+    return frame;
+}
+
+struct RemeshLevel {
+    ivec2 size;
+    vec2 texels;
+    int first;
+};
+
+int remeshLevels() { return int(levels); }
+float remeshMapWidth() { return float(mapWidth); }
+RemeshLevel remeshLevel(int number) {
+    uvec4 stored = texelFetch(levelQuads, number);
+    RemeshLevel level;
+    level.first = int(stored.x);
+    level.size = ivec2(stored.yz);
+    level.texels = vec2(float(level.size.x), uintBitsToFloat(stored.w));
+    return level;
+}
+float remeshTexel(RemeshLevel level, int i) { return uintBitsToFloat(texelFetch(levelWords, level.first + i).x); }
+
+#include "mesostructure/shared/remesh_heights.h"
+#include "mesostructure/shared/remesh_sweep.h"
