@@ -31,6 +31,8 @@ double medianOf(std::vector<double> times) {
 using Math = meso::RemeshMath<float>;
 
 constexpr int kMostTessellated = 64;  // parts of an edge, on every device
+// Lavapipe loses patches of draws that become more than 65,536 vertices; a patch becomes 2,500 at most.
+constexpr uint32_t kPatchesOfADraw = 24;
 constexpr VkShaderStageFlags kPatchStages =
     VK_SHADER_STAGE_TESSELLATION_CONTROL_BIT | VK_SHADER_STAGE_TESSELLATION_EVALUATION_BIT;
 
@@ -229,7 +231,8 @@ struct RemeshMeter::State {
             if (swept[i].columns == 0) continue;
             vkCmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_GRAPHICS, pipeline.layout(), 0, 1,
                                     &patches.sets[i].set, 0, nullptr);
-            vkCmdDraw(commands, 3 * swept[i].pieces, 1, 0, 0);
+            for (uint32_t first = 0; first < swept[i].pieces; first += kPatchesOfADraw)
+                vkCmdDraw(commands, 3 * std::min(kPatchesOfADraw, swept[i].pieces - first), 1, 3 * first, 0);
         }
         vkCmdEndRenderPass(commands);
     }
@@ -281,7 +284,7 @@ Result<RemeshTimes> RemeshMeter::measure(const meso::RemeshSurface& surface, con
     std::vector<double> pieces, sweeps, processor;
     for (int round = 0; round <= rounds; ++round) {
         const double start = processorMs();
-        VCP_TRY(meso::makeRemeshPieces(surface, camera, options, s.pieces));
+        VCP_TRY(meso::makeRemeshPieces(surface, camera, options, s.pieces, s.pass->limits()));
         VCP_TRY(s.pass->prepare(s.swept, s.pieces, levels));
         const double prepared = processorMs();
         VCP_TRY_ASSIGN(const double ms, s.milliseconds([&](VkCommandBuffer commands) {
@@ -311,7 +314,7 @@ Result<RemeshDrawn> RemeshMeter::draw(const meso::RemeshSurface& surface, const 
     if (!sweeps) cut.mostCells = std::min(options.mostCells, kMostTessellated);
     VCP_TRY_ASSIGN(const auto levels, s.resources->words(meso::remeshLevelWords(*surface.heights)));
     VCP_TRY(s.prepareTarget(width, height));
-    VCP_TRY(meso::makeRemeshPieces(surface, camera, cut, s.pieces));
+    VCP_TRY(meso::makeRemeshPieces(surface, camera, cut, s.pieces, s.pass->limits()));
     VCP_TRY(s.pass->prepare(s.swept, s.pieces, levels));
     if (!sweeps) {
         VCP_TRY(s.patches.create(*s.device));

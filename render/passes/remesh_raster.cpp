@@ -84,7 +84,8 @@ Result<void> RemeshRaster::prepare(RemeshTarget& target, PictureSize size, size_
 Result<void> RemeshRaster::remesh(RemeshTarget& target, size_t number, const RemeshedSurface& surface,
                                   const MesoTexels& levels, const RemeshLook& look) {
     RemeshDrawing& drawing = target.drawings[number];
-    VCP_TRY(meso::makeRemeshPieces(*surface.surface, cameraOf(*surface.surface, look), surface.options, target.pieces));
+    VCP_TRY(meso::makeRemeshPieces(*surface.surface, cameraOf(*surface.surface, look), surface.options, target.pieces,
+                                   sweep_.limits()));
     drawing.view = target.pieces.view;
     return sweep_.prepare(drawing.batches, target.pieces, levels);
 }

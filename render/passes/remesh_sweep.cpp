@@ -127,6 +127,14 @@ void RemeshSweepPass::writeSet(const RemeshSwept& swept, const MesoTexels& level
     vkUpdateDescriptorSets(device_.handle(), kBindingCount, writes, 0, nullptr);
 }
 
+meso::RemeshBatchLimits RemeshSweepPass::limits() const {
+    meso::RemeshBatchLimits limits;
+    // Buffers may have half as much room again.
+    const uint64_t texels = device_.limits().maxTexelBufferElements, quads = 2 * uint64_t{Math::kRemeshPieceQuads};
+    limits.pieces = std::min(limits.pieces, texels / quads);
+    return limits;
+}
+
 Result<void> RemeshSweepPass::prepare(std::vector<RemeshSwept>& swept, const meso::RemeshPieces& pieces,
                                       const MesoTexels& levels) {
     VCP_TRY(createPipelines());
