@@ -413,7 +413,7 @@ private:
         report_.warnings.push_back(
             fmt::format("{} of {} triangles are smaller than this file can tell, {:.4g}: they lose their shape; build "
                         "meshes of very different sizes into files of their own, which a scene shows together, or "
-                        "choose a smaller --cell",
+                        "choose a smaller cell edge",
                         tiny, measures_.triangles, 2 * plan_.frame.cell / kLatticePerCell));
     }
 

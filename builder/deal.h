@@ -58,7 +58,7 @@ struct Dealing {
     /// Take triangles with images, by the pages that need them; null: there are none.
     RecordBins<TexturedTriangle>* textures;
     const FinestPages& pages;
-    double marginCells;  ///< how far around a page it needs them
+    double marginCells;           ///< how far around a page it needs them
     std::atomic<uint64_t>& tiny;  ///< counts the triangles that are less than two steps of the lattice along each axis
     /// Called with the part of the soup that is read; false cancels. Any of the threads calls it.
     std::function<bool(double)> progress;

@@ -47,7 +47,8 @@ private:
 
     /// Checks that it is a .vcp of a known version, and that the file is complete.
     [[nodiscard]] Result<void> identity() const {
-        if (std::memcmp(h_.magic, FileHeader{}.magic, sizeof h_.magic) != 0) return fail(0, "not a .vcp file; of meshes, vcp build makes one");
+        if (std::memcmp(h_.magic, FileHeader{}.magic, sizeof h_.magic) != 0)
+            return fail(0, "not a .vcp file; of meshes, vcp build makes one");
         if (!isKnownVersion(h_.version))
             return fail(8,
                         fmt::format("file version {} is not known; this program reads versions {} to {}: {}",

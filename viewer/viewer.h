@@ -57,11 +57,11 @@ enum class ViewerAction {
     ToggleColour,      ///< the dataset's colours, or clay
     ToggleUpAxis,      ///< y or z
     ToggleFly,
-    TogglePlay,  ///< surfaces that go along paths go on, or stay where they are
     ViewFront,
     ViewRight,
     ViewTop,
     ViewIsometric,
+    TogglePlay,  ///< surfaces that go along paths go on, or stay where they are
 };
 
 struct ViewerOptions {

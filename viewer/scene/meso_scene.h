@@ -83,8 +83,8 @@ inline glm::dvec3 turnedUp(glm::dvec3 p, UpAxis up) { return up == UpAxis::Z ? p
 
 struct MesoScene {
     std::vector<MesoSurface> surfaces;
-    std::vector<SurfacePath> paths;  ///< of the surfaces, one each, from where they lie: FrameRequest::surfacesMoved
-    Box bounds = Box::nothing();     ///< wherever they go
+    std::vector<SurfacePath> paths;     ///< of the surfaces, one each, from where they lie: FrameRequest::surfacesMoved
+    Box bounds = Box::nothing();        ///< wherever they go
     std::vector<std::string> warnings;  ///< properties of shells and maps that a picture may show
 };
 
