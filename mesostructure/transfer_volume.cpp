@@ -19,7 +19,7 @@
 
 namespace vcp::meso {
 
-namespace f32 {
+namespace transfer_f32 {
 
 #define INLINE inline
 
@@ -44,7 +44,7 @@ struct TransferLookup {
 static_assert(kTransferTexels == TransferVolume::kTexels &&
               uint64_t{kTransferHalf} * kTransferHalf - 1 == TransferVolume::kMostCells);
 
-}  // namespace f32
+}  // namespace transfer_f32
 
 namespace {
 
@@ -238,7 +238,7 @@ Result<TransferVolume> traceTransfer(const Shape& shape, const TransferOptions& 
 f32::Harmonics TransferReader::at(dvec3 place, dvec3 normal) const {
     dvec3 part = place / extent_;
     part.x -= std::floor(part.x), part.y -= std::floor(part.y);
-    f32::TransferLookup lookup{texels_.data()};
+    transfer_f32::TransferLookup lookup{texels_.data()};
     return lookup.transferAt(0, glm::uvec3(cells_), glm::vec3(part), glm::vec3(normal));
 }
 

@@ -55,12 +55,13 @@ bool looksLikeBinaryStl(std::span<const std::byte> start) {
 }
 
 /// Whether a file that begins so may be somebody's own, of which there is no other: a mesh without what ours say at
-/// their beginning (mesh_format.cpp, base_file.cpp).
+/// their beginning (mesh_format.cpp, base_file.cpp, make_scan).
 bool isOriginal(OutputKind kind, std::span<const std::byte> start) {
     constexpr OutputKind kMeshes[] = {OutputKind::Ply, OutputKind::Obj, OutputKind::Stl, OutputKind::Glb};
+    constexpr std::string_view kOurs[] = {"certified_distance", "vcp", "procedural"};
     const std::string_view text(reinterpret_cast<const char*>(start.data()), start.size());
-    const auto says = [&](std::string_view word) { return text.find(word) != std::string_view::npos; };
-    return std::ranges::find(kMeshes, kind) != std::end(kMeshes) && !says("certified_distance") && !says("vcp");
+    const auto isSaid = [&](std::string_view word) { return text.find(word) != std::string_view::npos; };
+    return std::ranges::find(kMeshes, kind) != std::end(kMeshes) && std::ranges::none_of(kOurs, isSaid);
 }
 
 /// Datasets and assets are marked: their header is written last, so that a mark can stand in its place until then.

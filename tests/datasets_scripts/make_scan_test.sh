@@ -70,7 +70,7 @@ refuses 1 "No space left" -o /dev/full
 [ -e /dev/full ] || fail "/dev/full was removed"
 
 # A file size limit stands in for a full disk; the old file must survive.
-printf "ply\nold\n" >kept.ply
+printf "ply\ncomment procedural\nold\n" >kept.ply
 status=0
 (trap '' XFSZ; ulimit -f 100; exec "$make_scan" --triangles 100000 -o kept.ply) 2>err.txt || status=$?
 [ "$status" -eq 1 ] || fail "full disk: exit status $status"

@@ -96,6 +96,16 @@ TEST_F(OutputFiles, WriteProtectedOnesAreKept) {
     EXPECT_EQ(fs::status(path).permissions(), fs::perms::owner_read);
 }
 
+TEST_F(OutputFiles, MeshesThatOthersWroteAreReplacedWhenAskedFor) {
+    const auto path = folder_ / "scan.obj";
+    const auto holds = [&](const std::string& text) { std::ofstream(path) << text; };
+    holds("# exported by a scanner\nv 0 0 0\n");
+    EXPECT_NE(writeFile(path, OutputKind::Obj, "v 1 1 1\n").error().line().find("did not write"), std::string::npos);
+    EXPECT_EQ(contentOf(path), "# exported by a scanner\nv 0 0 0\n");
+    EXPECT_TRUE(writeFile(path, OutputKind::Obj, "# certified_distance 0\nv 1 1 1\n", {.overwrite = true}).ok());
+    EXPECT_TRUE(writeFile(path, OutputKind::Obj, "v 2 2 2\n").ok()) << "what was there is an export";
+}
+
 TEST_F(OutputFiles, OnlyRegularFilesAreReplaced) {
     ASSERT_EQ(::mkfifo((folder_ / "pipe").c_str(), 0600), 0);
     const int socket = ::socket(AF_UNIX, SOCK_STREAM, 0);

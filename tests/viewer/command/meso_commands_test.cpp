@@ -154,12 +154,12 @@ TEST_F(MesoCommands, WhatMovesIsAnimated) {
     const auto drawn = [&](const std::string& options) {
         return run("render " + scene + options + " -o " + path("a.png") + how + " --depth " + path("a.pfm"));
     };
-    const Ran ran = drawn(" --animate --frames 3");
+    const Ran ran = drawn(" --animate --frames 4");
     ASSERT_EQ(ran.status, 0) << ran.err;
     const std::string first = contentOf(path("a-0001.pfm")), second = contentOf(path("a-0002.pfm"));
     EXPECT_TRUE(first != second);
     EXPECT_TRUE(second != contentOf(path("a-0003.pfm")));
-    EXPECT_FALSE(std::filesystem::exists(path("a-0004.png")));
+    EXPECT_FALSE(std::filesystem::exists(path("a-0005.png")));
     ASSERT_EQ(drawn("").status, 0);
     EXPECT_TRUE(contentOf(path("a.pfm")) == first) << "at the beginning it lies where the scene says";
     const Ran none = run("render " VCP_SOURCE_DIR "/docs/scenes/kitten_wall.json --animate -o " + path("a.png") + how);
