@@ -24,6 +24,7 @@ namespace transfer_f32 {
 #define INLINE inline
 
 using uint = uint32_t;
+using f32::Harmonics, f32::clampedCosine;
 using glm::floor, glm::max, glm::uvec3, glm::vec3, glm::vec4;
 #include "mesostructure/shared/transfer_layout.h"
 
