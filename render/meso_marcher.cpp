@@ -1,6 +1,5 @@
 #include "render/meso_marcher.h"
 
-#include <chrono>
 #include <ctime>
 
 #include <fmt/format.h>
@@ -21,21 +20,6 @@ struct MesoMarcher::State {
     std::unique_ptr<Device> device;
     std::unique_ptr<MesoResources> resources;
     PassTimer timer;
-
-    /// Returns the time of what is recorded, by the queue's clock, or where it has none, the time of the call.
-    Result<double> milliseconds(const MesoRaysPass& pass) {
-        const auto start = std::chrono::steady_clock::now();
-        VCP_TRY(device->submitAndWait([&](VkCommandBuffer commands) {
-            timer.reset(commands);
-            timer.mark(commands, 0);
-            pass.record(commands);
-            timer.mark(commands, 1);
-        }));
-        if (!timer.hasClock())
-            return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
-        VCP_TRY_ASSIGN(const auto ms, timer.read());
-        return ms.front();
-    }
 };
 
 MesoMarcher::MesoMarcher(std::unique_ptr<State> state) : state_(std::move(state)) {}
@@ -69,7 +53,9 @@ Result<std::vector<MesoMarched>> MesoMarcher::march(std::span<const meso::Method
     for (int round = 0; round <= rounds; ++round)
         for (size_t i = 0; i < passes.size(); ++i) {
             const std::clock_t start = std::clock();
-            VCP_TRY_ASSIGN(const auto ms, state_->milliseconds(passes[i]));
+            VCP_TRY_ASSIGN(const auto ms, state_->timer.timed(*state_->device, [&](VkCommandBuffer commands) {
+                passes[i].record(commands);
+            }));
             const double processorMs = double(std::clock() - start) * 1e3 / CLOCKS_PER_SEC;
             if (round > 0)
                 marched[i].nsPerRay.push_back((device().software ? processorMs : ms) * 1e6 / double(rays.size()));

@@ -1,7 +1,6 @@
 #include "render/remesh_meter.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstring>
 #include <ctime>
@@ -155,17 +154,7 @@ struct Patches {
         sets.clear();
         for (const RemeshSwept& batch : swept) {
             const VkDescriptorPoolSize size{kTexels, 3};
-            VkDescriptorPoolCreateInfo pool{VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO};
-            pool.maxSets = pool.poolSizeCount = 1;
-            pool.pPoolSizes = &size;
-            VkDescriptorPool made = VK_NULL_HANDLE;
-            VCP_VK(vkCreateDescriptorPool, device, &pool, nullptr, &made);
-            MesoSet& owner = sets.emplace_back(device, made);
-            VkDescriptorSetAllocateInfo allocation{VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO};
-            allocation.descriptorPool = made;
-            allocation.descriptorSetCount = 1;
-            allocation.pSetLayouts = &setLayout;
-            VCP_VK(vkAllocateDescriptorSets, device, &allocation, &owner.set);
+            VCP_TRY_ASSIGN(auto owner, allocateSet(device, setLayout, std::span(&size, 1)));
             const VkBufferView views[] = {levels.view.handle(), levels.quads.handle(), batch.quadsView.handle()};
             VkWriteDescriptorSet write{VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET};
             write.dstSet = owner.set;
@@ -175,6 +164,7 @@ struct Patches {
                 write.pTexelBufferView = &views[write.dstBinding];
                 vkUpdateDescriptorSets(device, 1, &write, 0, nullptr);
             }
+            sets.push_back(std::move(owner));
         }
         return {};
     }
@@ -210,14 +200,7 @@ struct RemeshMeter::State {
     void drawTriangles(VkCommandBuffer commands, const RemeshProjection& projection) const {
         triangles.begin(commands, target.framebuffer(), target.size());
         vkCmdPushConstants(commands, triangles.layout(), triangles.pushStages(), 0, sizeof projection, &projection);
-        for (const RemeshSwept& batch : swept) {
-            if (batch.columns == 0) continue;
-            const VkBuffer vertices = batch.vertices.handle();
-            const VkDeviceSize start = 0;
-            vkCmdBindVertexBuffers(commands, 0, 1, &vertices, &start);
-            vkCmdBindIndexBuffer(commands, batch.indices.handle(), 0, VK_INDEX_TYPE_UINT32);
-            vkCmdDrawIndexedIndirect(commands, batch.drawn.handle(), 0, 1, 0);
-        }
+        drawSwept(commands, swept);
         vkCmdEndRenderPass(commands);
     }
     void drawPatches(VkCommandBuffer commands, const RemeshProjection& projection,
@@ -235,22 +218,6 @@ struct RemeshMeter::State {
                 vkCmdDraw(commands, 3 * std::min(kPatchesOfADraw, swept[i].pieces - first), 1, 3 * first, 0);
         }
         vkCmdEndRenderPass(commands);
-    }
-    /// Returns the queue's time of what is recorded, or where it has no clock, the time of the call.
-    template <class Record>
-    Result<double> milliseconds(const Record& record) {
-        const auto start = std::chrono::steady_clock::now();
-        VCP_TRY(device->submitAndWait([&](VkCommandBuffer commands) {
-            timer.reset(commands);
-            barrierToAll(commands);
-            timer.mark(commands, 0);
-            record(commands);
-            timer.mark(commands, 1);
-        }));
-        if (!timer.hasClock())
-            return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
-        VCP_TRY_ASSIGN(const auto ms, timer.read());
-        return ms.front();
     }
 };
 
@@ -287,7 +254,8 @@ Result<RemeshTimes> RemeshMeter::measure(const meso::RemeshSurface& surface, con
         VCP_TRY(meso::makeRemeshPieces(surface, camera, options, s.pieces, s.pass->limits()));
         VCP_TRY(s.pass->prepare(s.swept, s.pieces, levels));
         const double prepared = processorMs();
-        VCP_TRY_ASSIGN(const double ms, s.milliseconds([&](VkCommandBuffer commands) {
+        VCP_TRY_ASSIGN(const double ms, s.timer.timed(*s.device, [&](VkCommandBuffer commands) {
+            barrierToAll(commands);
             s.pass->record(commands, s.swept, *surface.heights, s.pieces.view);
         }));
         if (round == 0) continue;
@@ -324,7 +292,8 @@ Result<RemeshDrawn> RemeshMeter::draw(const meso::RemeshSurface& surface, const 
     std::vector<double> times, processor;
     for (int round = 0; round <= rounds; ++round) {
         const double start = processorMs();
-        VCP_TRY_ASSIGN(const double ms, s.milliseconds([&](VkCommandBuffer commands) {
+        VCP_TRY_ASSIGN(const double ms, s.timer.timed(*s.device, [&](VkCommandBuffer commands) {
+            barrierToAll(commands);
             if (sweeps) {
                 s.pass->record(commands, s.swept, *surface.heights, s.pieces.view);
                 s.drawTriangles(commands, projection);

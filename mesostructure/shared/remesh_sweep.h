@@ -255,6 +255,17 @@ INLINE void remeshAddStrip(CONST_REF(RemeshSweep) s, CONST_REF(RemeshStrip) stri
     }
 }
 
+// A point whose height is not known yet.
+INLINE RemeshPoint remeshFlatPoint(Real3 position, Real3 direction, Real2 uv, Real density) {
+    RemeshPoint point;
+    point.position = position;
+    point.direction = direction;
+    point.uv = uv;
+    point.density = density;
+    point.height = Real(0);
+    return point;
+}
+
 // The i-th of the n points of the edge from corner k to the next, without its height.
 INLINE RemeshPoint remeshEdgePoint(int k, int i, int n) {
     RemeshCorner a = remeshCorner(k), b = remeshCorner((k + 1) % 3);
@@ -264,13 +275,7 @@ INLINE RemeshPoint remeshEdgePoint(int k, int i, int n) {
                   direction = (a.direction * a.weight * x + b.direction * b.weight * y) / sum;
     PRECISE Real2 uv = (a.uv * a.weight * x + b.uv * b.weight * y) / sum;
     PRECISE Real density = (a.density * a.weight * x + b.density * b.weight * y) / sum;
-    RemeshPoint point;
-    point.position = position;
-    point.direction = direction;
-    point.uv = uv;
-    point.density = density;
-    point.height = Real(0);
-    return point;
+    return remeshFlatPoint(position, direction, uv, density);
 }
 
 // Where the map jumps along an edge: the coordinates that the other side has at a point.
@@ -300,13 +305,7 @@ INLINE RemeshPoint remeshInsidePoint(CONST_REF(RemeshSweep) s, CONST_REF(RemeshC
                   direction = (x * a.direction + y * b.direction + z * c.direction) / sum;
     PRECISE Real2 uv = (x * a.uv + y * b.uv + z * c.uv) / sum;
     PRECISE Real density = (x * a.density + y * b.density + z * c.density) / sum;
-    RemeshPoint point;
-    point.position = position;
-    point.direction = direction;
-    point.uv = uv;
-    point.density = density;
-    point.height = Real(0);
-    return point;
+    return remeshFlatPoint(position, direction, uv, density);
 }
 
 // Adds the points of a column: the corners if it is the first; its point of the primary edge; those of the side edge

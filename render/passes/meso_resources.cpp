@@ -91,20 +91,26 @@ Result<Buffer> MesoResources::storage(uint64_t bytes) const {
         MemoryUse::Local);
 }
 
-Result<MesoSet> MesoResources::makeSet(const Bound& bound) const {
-    const VkDescriptorPoolSize sizes[] = {{VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, 1}, {kTexels, 4}, {kStorage, 5}};
+Result<MesoSet> allocateSet(VkDevice device, VkDescriptorSetLayout layout,
+                            std::span<const VkDescriptorPoolSize> sizes) {
     VkDescriptorPoolCreateInfo pool{VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO};
     pool.maxSets = 1;
-    pool.poolSizeCount = std::size(sizes);
-    pool.pPoolSizes = sizes;
+    pool.poolSizeCount = uint32_t(sizes.size());
+    pool.pPoolSizes = sizes.data();
     VkDescriptorPool made = VK_NULL_HANDLE;
-    VCP_VK(vkCreateDescriptorPool, device_.handle(), &pool, nullptr, &made);
-    MesoSet owner(device_.handle(), made);
+    VCP_VK(vkCreateDescriptorPool, device, &pool, nullptr, &made);
+    MesoSet owner(device, made);
     VkDescriptorSetAllocateInfo allocation{VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO};
     allocation.descriptorPool = made;
     allocation.descriptorSetCount = 1;
-    allocation.pSetLayouts = &setLayout_;
-    VCP_VK(vkAllocateDescriptorSets, device_.handle(), &allocation, &owner.set);
+    allocation.pSetLayouts = &layout;
+    VCP_VK(vkAllocateDescriptorSets, device, &allocation, &owner.set);
+    return owner;
+}
+
+Result<MesoSet> MesoResources::makeSet(const Bound& bound) const {
+    const VkDescriptorPoolSize sizes[] = {{VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, 1}, {kTexels, 4}, {kStorage, 5}};
+    VCP_TRY_ASSIGN(auto owner, allocateSet(device_.handle(), setLayout_, sizes));
 
     const VkBufferView views[kMesoBindingCount] = {VK_NULL_HANDLE,
                                                    bound.words->view.handle(),

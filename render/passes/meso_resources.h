@@ -65,6 +65,9 @@ private:
     VkDescriptorPool pool_ = VK_NULL_HANDLE;
 };
 
+/// Allocates a set from a pool of its own, which has room for `sizes`. Errors: Device.
+Result<MesoSet> allocateSet(VkDevice device, VkDescriptorSetLayout layout, std::span<const VkDescriptorPoolSize> sizes);
+
 class MesoResources {
 public:
     static Result<std::unique_ptr<MesoResources>> create(Device& device);

@@ -114,14 +114,7 @@ void RemeshRaster::record(VkCommandBuffer commands, const RemeshTarget& target, 
     sweep_.record(commands, drawing.batches, *drawn.heights, drawing.view);
     pipeline_.begin(commands, target.images.framebuffer(), target.images.size());
     vkCmdPushConstants(commands, pipeline_.layout(), pipeline_.pushStages(), 0, sizeof projection, &projection);
-    for (const RemeshSwept& batch : drawing.batches) {
-        if (batch.columns == 0) continue;
-        const VkBuffer vertices = batch.vertices.handle();
-        const VkDeviceSize start = 0;
-        vkCmdBindVertexBuffers(commands, 0, 1, &vertices, &start);
-        vkCmdBindIndexBuffer(commands, batch.indices.handle(), 0, VK_INDEX_TYPE_UINT32);
-        vkCmdDrawIndexedIndirect(commands, batch.drawn.handle(), 0, 1, 0);
-    }
+    drawSwept(commands, drawing.batches);
     vkCmdEndRenderPass(commands);
     for (size_t i = 0; i < target.copies.size(); ++i) target.images.copy(commands, i, target.copies[i].buffer);
     barrierToAll(commands);

@@ -18,6 +18,7 @@ using Math = meso::RemeshMath<float>;
 
 constexpr VkDescriptorType kBindings[] = {kTexels, kTexels, kTexels, kTexels, kStorage, kStorage, kStorage, kStorage};
 constexpr uint32_t kBindingCount = std::size(kBindings);
+constexpr VkDescriptorPoolSize kPoolSizes[] = {{kTexels, 4}, {kStorage, 4}};
 // Columns of a workgroup of the counting and of the writing shader.
 constexpr uint32_t kCounted = 256, kEmitted = 64;
 constexpr uint64_t kVertexBytes = sizeof(meso::RemeshVertex<float>);
@@ -58,23 +59,6 @@ Result<void> RemeshSweepPass::createPipelines() {
     VCP_TRY_ASSIGN(scan_, ComputePipeline::create(device_, layout_, kRemeshScanSpirv, {}));
     VCP_TRY_ASSIGN(emit_, ComputePipeline::create(device_, layout_, kRemeshEmitSpirv, {}));
     return {};
-}
-
-Result<MesoSet> RemeshSweepPass::createSet() const {
-    const VkDescriptorPoolSize sizes[] = {{kTexels, 4}, {kStorage, 4}};
-    VkDescriptorPoolCreateInfo pool{VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO};
-    pool.maxSets = 1;
-    pool.poolSizeCount = std::size(sizes);
-    pool.pPoolSizes = sizes;
-    VkDescriptorPool made = VK_NULL_HANDLE;
-    VCP_VK(vkCreateDescriptorPool, device_.handle(), &pool, nullptr, &made);
-    MesoSet owner(device_.handle(), made);
-    VkDescriptorSetAllocateInfo allocation{VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO};
-    allocation.descriptorPool = made;
-    allocation.descriptorSetCount = 1;
-    allocation.pSetLayouts = &setLayout_;
-    VCP_VK(vkAllocateDescriptorSets, device_.handle(), &allocation, &owner.set);
-    return owner;
 }
 
 /// Makes a buffer that has room, where there is none; returns whether it did. It grows by halves, so that a camera's
@@ -153,7 +137,7 @@ Result<void> RemeshSweepPass::prepare(std::vector<RemeshSwept>& swept, const mes
         VCP_TRY(
             grow(made.indices, 24 * batch.mostVertices, kRead | VK_BUFFER_USAGE_INDEX_BUFFER_BIT, MemoryUse::Local));
         if (made.set.set == VK_NULL_HANDLE) {
-            VCP_TRY_ASSIGN(made.set, createSet());
+            VCP_TRY_ASSIGN(made.set, allocateSet(device_.handle(), setLayout_, kPoolSizes));
         }
         writeSet(made, levels);
         made.pieces = batch.pieces(), made.columns = batch.columns();
@@ -187,6 +171,17 @@ void RemeshSweepPass::record(VkCommandBuffer commands, const std::vector<RemeshS
     barrierComputeToCompute(commands);
     forEach([&](const RemeshSwept& batch) { dispatch(emit_, batch, groups(batch.columns, kEmitted)); });
     barrierComputeToDraw(commands);
+}
+
+void drawSwept(VkCommandBuffer commands, const std::vector<RemeshSwept>& swept) {
+    for (const RemeshSwept& batch : swept) {
+        if (batch.columns == 0) continue;
+        const VkBuffer vertices = batch.vertices.handle();
+        const VkDeviceSize start = 0;
+        vkCmdBindVertexBuffers(commands, 0, 1, &vertices, &start);
+        vkCmdBindIndexBuffer(commands, batch.indices.handle(), 0, VK_INDEX_TYPE_UINT32);
+        vkCmdDrawIndexedIndirect(commands, batch.drawn.handle(), 0, 1, 0);
+    }
 }
 
 }  // namespace vcp

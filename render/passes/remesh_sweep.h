@@ -45,7 +45,6 @@ public:
 
 private:
     Result<void> createPipelines();
-    Result<MesoSet> createSet() const;
     Result<bool> grow(Buffer& buffer, uint64_t bytes, VkBufferUsageFlags usage, MemoryUse use) const;
     Result<void> upload(RemeshSwept& swept, const meso::RemeshBatch& batch) const;
     void writeSet(const RemeshSwept& swept, const MesoTexels& levels) const;
@@ -55,5 +54,8 @@ private:
     VkPipelineLayout layout_ = VK_NULL_HANDLE;
     ComputePipeline count_, scan_, emit_;
 };
+
+/// Records the draws of what was swept, within a render pass.
+void drawSwept(VkCommandBuffer commands, const std::vector<RemeshSwept>& swept);
 
 }  // namespace vcp

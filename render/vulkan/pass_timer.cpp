@@ -1,5 +1,6 @@
 #include "render/vulkan/pass_timer.h"
 
+#include <chrono>
 #include <utility>
 
 #include "render/vulkan/check.h"
@@ -42,6 +43,19 @@ Result<std::vector<double>> PassTimer::read() const {
            sizeof(uint64_t), VK_QUERY_RESULT_64_BIT | VK_QUERY_RESULT_WAIT_BIT);
     for (uint32_t i = 0; i + 1 < marks_; ++i) ms[i] = double(t[i + 1] - t[i]) * device_->timestampNanoseconds() * 1e-6;
     return ms;
+}
+
+Result<double> PassTimer::timed(Device& device, const std::function<void(VkCommandBuffer)>& record) const {
+    const auto start = std::chrono::steady_clock::now();
+    VCP_TRY(device.submitAndWait([&](VkCommandBuffer commands) {
+        reset(commands);
+        mark(commands, 0);
+        record(commands);
+        mark(commands, 1);
+    }));
+    if (!hasClock()) return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+    VCP_TRY_ASSIGN(const auto ms, read());
+    return ms.front();
 }
 
 }  // namespace vcp

@@ -1,6 +1,7 @@
 // Reads the queue's clock between passes.
 #pragma once
 
+#include <functional>
 #include <vector>
 
 #include "octree/io/result.h"
@@ -24,6 +25,10 @@ public:
     void mark(VkCommandBuffer commands, uint32_t i) const;
     /// Returns the milliseconds between consecutive marks. Precondition: what was recorded is done. Errors: Device.
     [[nodiscard]] Result<std::vector<double>> read() const;
+
+    /// Submits what `record` records, with a mark before and behind it, and waits. Returns the milliseconds between the
+    /// marks, or without a clock those of the call. Precondition: there are two marks. Errors: Device.
+    Result<double> timed(Device& device, const std::function<void(VkCommandBuffer)>& record) const;
 
 private:
     const Device* device_ = nullptr;  // not owned

@@ -3,10 +3,8 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
 #include <cstring>
-#include <map>
 #include <random>
 
 #include <gtest/gtest.h>
@@ -16,6 +14,7 @@
 #include "mesostructure/solids.h"
 #include "render/passes/readback.h"
 #include "render/remesh_meter.h"
+#include "tests/support/remeshed_views.h"
 
 namespace vcp {
 namespace {
@@ -23,6 +22,7 @@ namespace {
 using namespace meso;
 using glm::dvec3;
 
+using meso::test::lookFrom, meso::test::openEdges;
 using Mesh = RemeshMesh<float>;
 
 class RemeshSweeps : public testing::Test {
@@ -50,18 +50,6 @@ protected:
         auto levels = std::make_shared<HeightLevels>(
             *HeightLevels::build(*makeHeightField(heights, 64, 1), {.mostLevels = mostLevels}));
         return *buildRemeshSurface(*makeBaseSurface(base, tiles), levels, height);
-    }
-    static RemeshCamera lookFrom(dvec3 eye, dvec3 at, double pixels) {
-        RemeshCamera camera;
-        camera.eye = eye;
-        camera.forward = glm::normalize(at - eye);
-        camera.right = glm::normalize(glm::cross(camera.forward, dvec3(0.1, 0.2, 1)));
-        camera.up = glm::cross(camera.right, camera.forward);
-        const double tangent = std::tan(0.5);
-        camera.focal = pixels / 2 / tangent;
-        camera.seen = {-tangent, -tangent, tangent, tangent};
-        camera.nearest = 1e-3;
-        return camera;
     }
     static Mesh onProcessor(const RemeshSurface& surface, const RemeshCamera& camera, const RemeshOptions& options) {
         Mesh mesh;
@@ -122,27 +110,6 @@ protected:
     std::vector<RemeshSwept> swept_;
     RemeshPieces pieces_;
 };
-
-/// Counts the directed edges, by the bits of their ends' positions, that no triangle has the other way: cracks and
-/// T-vertices of a closed surface.
-uint64_t openEdges(const Mesh& mesh) {
-    using Place = std::array<float, 3>;
-    std::map<std::pair<Place, Place>, int> uses;
-    for (size_t i = 0; i < mesh.indices.size(); i += 3)
-        for (size_t k = 0; k < 3; ++k) {
-            const auto placeOf = [&](size_t corner) {
-                const glm::vec3 p = mesh.vertices[mesh.indices[corner]].position;
-                return Place{p.x + 0.0f, p.y + 0.0f, p.z + 0.0f};
-            };
-            const Place from = placeOf(i + k), to = placeOf(i + (k + 1) % 3);
-            if (from == to) continue;
-            if (from < to)
-                ++uses[{from, to}];
-            else
-                --uses[{to, from}];
-        }
-    return uint64_t(std::ranges::count_if(uses, [](const auto& use) { return use.second != 0; }));
-}
 
 TEST_F(RemeshSweeps, VerticesAreTheProcessors) {
     for (const auto& [base, heights] :

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
 #include <map>
 #include <random>
@@ -14,11 +13,13 @@
 
 #include "mesostructure/remesh/remesh_math.h"
 #include "mesostructure/solids.h"
+#include "tests/support/remeshed_views.h"
 
 namespace vcp::meso {
 namespace {
 
 using glm::dvec2, glm::dvec3;
+using test::lookFrom, test::openEdges;
 
 std::shared_ptr<const HeightLevels> levelsOf(std::string_view name, int texels = 64) {
     static std::map<std::string, std::shared_ptr<const HeightLevels>> known;
@@ -33,47 +34,12 @@ RemeshSurface surfaceOf(const BaseSurface& base, double height, std::string_view
     return *std::move(made);
 }
 
-/// A camera that looks at a point, `pixels` high at 60 degrees.
-RemeshCamera lookFrom(dvec3 eye, dvec3 at, double pixels) {
-    RemeshCamera camera;
-    camera.eye = eye;
-    camera.forward = glm::normalize(at - eye);
-    camera.right = glm::normalize(glm::cross(camera.forward, dvec3(0.1, 0.2, 1)));
-    camera.up = glm::cross(camera.right, camera.forward);
-    const double tangent = std::tan(0.5);
-    camera.focal = pixels / 2 / tangent;
-    camera.seen = {-tangent, -tangent, tangent, tangent};
-    camera.nearest = 1e-3;
-    return camera;
-}
-
 template <class Real>
 RemeshMesh<Real> meshOf(const RemeshSurface& surface, const RemeshCamera& camera, const RemeshOptions& options = {}) {
     RemeshMesh<Real> mesh;
     const auto made = remesh(surface, camera, options, mesh);
     EXPECT_TRUE(made.ok()) << made.error().line();
     return mesh;
-}
-
-/// Counts the directed edges, by the bits of their ends' positions, that no triangle has the other way.
-template <class Real>
-uint64_t openEdges(const RemeshMesh<Real>& mesh) {
-    using Place = std::array<Real, 3>;
-    std::map<std::pair<Place, Place>, int> uses;
-    for (size_t i = 0; i < mesh.indices.size(); i += 3)
-        for (int k = 0; k < 3; ++k) {
-            const auto placeOf = [&](size_t corner) {
-                const auto& p = mesh.vertices[mesh.indices[corner]].position;
-                return Place{p.x + Real(0), p.y + Real(0), p.z + Real(0)};
-            };
-            const Place from = placeOf(i + k), to = placeOf(i + (k + 1) % 3);
-            if (from == to) continue;
-            if (from < to)
-                ++uses[{from, to}];
-            else
-                --uses[{to, from}];
-        }
-    return uint64_t(std::ranges::count_if(uses, [](const auto& use) { return use.second != 0; }));
 }
 
 /// Rasterizes without cracks of its own: whether a pixel's middle is left of an edge is asked in one order of its ends.
