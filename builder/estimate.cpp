@@ -23,7 +23,7 @@ namespace {
 
 // Bytes of a triangle on the temporary disk (the soup while it is dealt, then the finest level's bins with what has
 // been built of it) and in the file (2.4 to 3.2 for scans, 4.7 with colour), before anything is known of it.
-constexpr double kTempBytesPerTriangle = 112, kFileBytesPerTriangle = 5;
+constexpr double kTempBytesPerTriangle = 64, kFileBytesPerTriangle = 5;
 // What colours from images add in the file; a sample has none.
 constexpr double kImageBytesPerTriangle = 2;
 // What their places in images add where these are kept.

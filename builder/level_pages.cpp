@@ -45,8 +45,8 @@ Result<BuiltPage> buildPage(const LevelSettings& settings, const LatticeMesh& me
                             std::span<const uint32_t> triangles, bool withSurface, size_t mostPieces) {
     VCP_TRY_ASSIGN(auto page, storedPage(settings, mesh, code, triangles));
     if (withSurface)
-        page.surface =
-            storedSurface(surfaceOf(mesh, triangles, mortonDecode(code), settings.grid.log2Cells, mostPieces));
+        page.surface = storedSurface(
+            surfaceOf(mesh, triangles, mortonDecode(code), settings.grid.log2Cells, mostPieces), settings.codesSurface);
     return page;
 }
 

@@ -19,9 +19,10 @@ struct LevelSettings {
     double tolerance = 0;  ///< in cells, for soft leaves; the finest level's includes the stray
     bool finest = false;
     bool withColour = false;
-    bool exact = false;      ///< leaves hold the mesh's triangles, whatever the tolerance
-    uint64_t pageBytes = 0;  ///< memory for the mesh and pages under construction
-    uint64_t roomBytes = 0;  ///< memory that makeRoom frees besides, for a page that is built alone
+    bool exact = false;         ///< leaves hold the mesh's triangles, whatever the tolerance
+    bool codesSurface = false;  ///< temporary files take less for the surface in the pages
+    uint64_t pageBytes = 0;     ///< memory for the mesh and pages under construction
+    uint64_t roomBytes = 0;     ///< memory that makeRoom frees besides, for a page that is built alone
     std::function<Result<void>()> makeRoom;
 };
 

@@ -211,6 +211,7 @@ uint64_t PartContext::firstCode(unsigned part) const {
 LevelSettings PartContext::settingsOf(int level, bool isFinest, TempSpace& space) const {
     LevelSettings settings = levels.settingsOf(level, isFinest);
     settings.withColour = hasColour;
+    settings.codesSurface = true;
     settings.roomBytes = memory.tempBytes;
     settings.makeRoom = [&space] { return space.spill(); };
     return settings;

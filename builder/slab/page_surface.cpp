@@ -1,17 +1,36 @@
 #include "builder/slab/page_surface.h"
 
+#include <algorithm>
+#include <array>
 #include <bit>
 #include <cstring>
 
 #include <glm/common.hpp>
 
 #include "builder/slab/triangle_cutter.h"
+#include "builder/spill/record_coder.h"
 #include "octree/surface/leaf_math.h"
 
 namespace vcp {
 
+namespace {
+
+void reserve(SurfaceCells& cells, size_t count) {
+    cells.codes.reserve(count);
+    cells.cells.reserve(count);
+}
+
+size_t coarserCells(const SurfaceCells& eighths) {
+    size_t count = 0;
+    for (size_t i = 0; i < eighths.size(); ++i) count += i == 0 || eighths.codes[i] >> 3 != eighths.codes[i - 1] >> 3;
+    return count;
+}
+
+}  // namespace
+
 SurfaceCells foldCells(const SurfaceCells& eighths) {
     SurfaceCells folded;
+    reserve(folded, coarserCells(eighths));
     std::vector<uint32_t> octants;
     for (size_t i = 0; i < eighths.size();) {
         const uint32_t code = eighths.codes[i] >> 3;
@@ -60,14 +79,13 @@ private:
 
 }  // namespace
 
-PageSurface surfaceOf(const LatticeMesh& mesh, std::span<const uint32_t> triangles, glm::u32vec3 page,
-                      uint32_t log2Cells, size_t mostPieces) {
+SurfaceCells surfaceOf(const LatticeMesh& mesh, std::span<const uint32_t> triangles, glm::u32vec3 page,
+                       uint32_t log2Cells, size_t mostPieces) {
     const glm::i32vec3 origin = glm::i32vec3(page) * (kLatticePerCell << log2Cells);
     const int depth = int(log2Cells) + 1;
-    PageSurface surface;
-    SurfaceCutter(mesh, origin, depth, mostPieces).run(triangles, {glm::ivec3(0), depth}, surface.halves);
-    surface.cells = foldCells(surface.halves);
-    return surface;
+    SurfaceCells halves;
+    SurfaceCutter(mesh, origin, depth, mostPieces).run(triangles, {glm::ivec3(0), depth}, halves);
+    return halves;
 }
 
 uint64_t halvesTouched(const LatticeMesh& mesh, std::span<const uint32_t> triangles, glm::u32vec3 page,
@@ -92,62 +110,104 @@ uint64_t halvesTouched(const LatticeMesh& mesh, std::span<const uint32_t> triang
     return halves;
 }
 
-namespace {
+PageFold::PageFold(uint32_t log2Cells, size_t halves) : log2Cells_(log2Cells) { reserve(above_.quarters, halves); }
 
-/// Appends the cells of a page to those of the page above.
-void append(SurfaceCells& to, const SurfaceCells& from, uint32_t octant, uint32_t depth) {
-    for (const uint32_t code : from.codes) to.codes.push_back(octant << 3 * depth | code);
-    to.cells.insert(to.cells.end(), from.cells.begin(), from.cells.end());
-}
-
-void reserve(SurfaceCells& cells, size_t count) {
-    cells.codes.reserve(count);
-    cells.cells.reserve(count);
-}
-
-}  // namespace
-
-PageFold::PageFold(uint32_t log2Cells, size_t halves, size_t quarters) : log2Cells_(log2Cells) {
-    reserve(above_.halves, halves);
-    reserve(above_.quarters, quarters);
-}
-
-void PageFold::add(const PageSurface& page, uint32_t octant) {
-    append(above_.halves, page.cells, octant, log2Cells_);
-    append(above_.quarters, page.halves, octant, log2Cells_ + 1);
+void PageFold::add(const SurfaceCells& halves, uint32_t octant) {
+    SurfaceCells& quarters = above_.quarters;
+    for (const uint32_t code : halves.codes) quarters.codes.push_back(octant << 3 * (log2Cells_ + 1) | code);
+    quarters.cells.insert(quarters.cells.end(), halves.cells.begin(), halves.cells.end());
 }
 
 PageSurface PageFold::take() {
+    above_.halves = foldCells(above_.quarters);
     above_.cells = foldCells(above_.halves);
     return std::move(above_);
 }
 
-size_t cellsIn(uint64_t storedBytes) { return storedBytes / (sizeof(uint32_t) + sizeof(CellSurface)); }
+namespace {
 
-std::vector<std::byte> bytesOf(const SurfaceCells& cells) {
-    const size_t codes = cells.size() * sizeof(uint32_t), all = cells.size() * sizeof(CellSurface);
-    std::vector<std::byte> bytes(codes + all);
-    if (bytes.empty()) return bytes;
-    std::memcpy(bytes.data(), cells.codes.data(), codes);
-    std::memcpy(bytes.data() + codes, cells.cells.data(), all);
-    return bytes;
+/// So many cells are coded at a time.
+constexpr size_t kBlockCells = 4096;
+
+/// A cell on temporary files: all of CellSurface but the axis.
+struct StoredCell {
+    uint32_t code = 0;
+    glm::vec3 lower{0}, upper{0};
+    float first = 0, last = 0, area = 0;
+    std::array<float, 6> moment{};
+    glm::vec4 light{0};
+    uint32_t parts = 0;
+};
+static_assert(sizeof(StoredCell) == 84 && sizeof(CellSurface) == sizeof(StoredCell) - sizeof(uint32_t) + 12);
+
+}  // namespace
+
+size_t storedCells(uint64_t geometryBytes) { return geometryBytes / sizeof(StoredCell); }
+
+StoredPage storedSurface(const SurfaceCells& cells, bool isCoded) {
+    StoredPage stored;
+    stored.geometryBytes = uint32_t(cells.size() * sizeof(StoredCell));
+    std::vector<StoredCell> block;
+    for (size_t first = 0; first < cells.size(); first += block.size()) {
+        block.resize(std::min(kBlockCells, cells.size() - first));
+        for (size_t i = 0; i < block.size(); ++i) {
+            const CellSurface& c = cells.cells[first + i];
+            block[i] = {cells.codes[first + i], c.lower, c.upper, c.first, c.last, c.area, c.moment, c.light, c.parts};
+        }
+        const auto bytes = std::as_bytes(std::span(block));
+        const size_t at = stored.geometry.size(), begin = at + sizeof(uint32_t);
+        stored.geometry.resize(begin);
+        if (!isCoded || !codeRecords(bytes, sizeof(StoredCell), stored.geometry))
+            stored.geometry.insert(stored.geometry.end(), bytes.begin(), bytes.end());
+        const auto blockBytes = uint32_t(stored.geometry.size() - begin);
+        std::memcpy(stored.geometry.data() + at, &blockBytes, sizeof blockBytes);
+    }
+    return stored;
 }
 
-SurfaceCells surfaceCellsFrom(std::span<const std::byte> bytes) {
-    const size_t count = cellsIn(bytes.size());
-    SurfaceCells cells{std::vector<uint32_t>(count), std::vector<CellSurface>(count)};
-    if (count == 0) return cells;
-    std::memcpy(cells.codes.data(), bytes.data(), count * sizeof(uint32_t));
-    std::memcpy(cells.cells.data(), bytes.data() + count * sizeof(uint32_t), count * sizeof(CellSurface));
+namespace {
+
+/// Takes the first block off `stored`, to `cells`. Returns false where it is not what was stored.
+bool takeBlock(std::span<const std::byte>& stored, std::span<StoredCell> cells) {
+    uint32_t blockBytes = 0;
+    if (stored.size() < sizeof blockBytes) return false;
+    std::memcpy(&blockBytes, stored.data(), sizeof blockBytes);
+    stored = stored.subspan(sizeof blockBytes);
+    if (stored.size() < blockBytes) return false;
+    const std::span<const std::byte> block = stored.first(blockBytes);
+    stored = stored.subspan(blockBytes);
+    const auto bytes = std::as_writable_bytes(cells);
+    if (block.size() != bytes.size()) return decodeRecords(block, sizeof(StoredCell), bytes);
+    std::ranges::copy(block, bytes.begin());
+    return true;
+}
+
+}  // namespace
+
+std::optional<SurfaceCells> surfaceFrom(const StoredPage& stored) {
+    std::span<const std::byte> left = stored.geometry;
+    const size_t count = storedCells(stored.geometryBytes);
+    SurfaceCells cells;
+    reserve(cells, count);
+    std::vector<StoredCell> block;
+    while (cells.size() < count) {
+        block.resize(std::min(kBlockCells, count - cells.size()));
+        if (!takeBlock(left, block)) return std::nullopt;
+        for (const StoredCell& s : block) {
+            cells.codes.push_back(s.code);
+            cells.cells.push_back({.lower = s.lower,
+                                   .upper = s.upper,
+                                   .first = s.first,
+                                   .last = s.last,
+                                   .area = s.area,
+                                   .moment = s.moment,
+                                   .light = s.light,
+                                   .parts = s.parts});
+            chooseAxis(cells.cells.back());
+        }
+    }
+    if (!left.empty()) return std::nullopt;
     return cells;
-}
-
-StoredPage storedSurface(const PageSurface& surface) {
-    return {.geometry = bytesOf(surface.cells), .colour = bytesOf(surface.halves)};
-}
-
-PageSurface surfaceFrom(const StoredPage& stored) {
-    return {.cells = surfaceCellsFrom(stored.geometry), .halves = surfaceCellsFrom(stored.colour)};
 }
 
 }  // namespace vcp

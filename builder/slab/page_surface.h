@@ -1,9 +1,10 @@
-// What is known of the mesh's surface in the cells of one page: cut from the page's triangles on the finest level, and
-// folded from the eight pages below on coarser ones. No page needs its neighbours.
+// What is known of the mesh's surface in the cells of one page: cut from the page's triangles where it holds the mesh,
+// and folded from the eight pages below on coarser levels. No page needs its neighbours.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -21,28 +22,27 @@ struct SurfaceCells {
     [[nodiscard]] size_t size() const { return codes.size(); }
 };
 
-/// The surface in a page: in its cells, and in the halves, quarters of their edges.
+/// The surface in a page of a coarser level: in its cells, and in the halves, quarters of their edges.
 struct PageSurface {
-    SurfaceCells cells, halves, quarters = {};
+    SurfaceCells cells, halves, quarters;
 };
 
 /// So many pieces of triangles are in memory at a time, unless they are all in half a cell.
 inline constexpr size_t kMostPieces = 1 << 19;
 
-/// Cuts triangles into the cells of a page and their halves; quarters stay empty. `triangles`: numbers in `mesh`, among
-/// them all that touch the page at `page` (Morton position, in pages of 2^log2Cells cells). The result does not depend
-/// on `mostPieces`.
-PageSurface surfaceOf(const LatticeMesh& mesh, std::span<const uint32_t> triangles, glm::u32vec3 page,
-                      uint32_t log2Cells, size_t mostPieces = kMostPieces);
+/// Cuts triangles into the halves of the cells of a page. `triangles`: numbers in `mesh`, among them all that touch the
+/// page at `page` (Morton position, in pages of 2^log2Cells cells). The result does not depend on `mostPieces`.
+SurfaceCells surfaceOf(const LatticeMesh& mesh, std::span<const uint32_t> triangles, glm::u32vec3 page,
+                       uint32_t log2Cells, size_t mostPieces = kMostPieces);
 
 /// Puts together the page above up to eight pages, one after the other, so that they need not be in memory together.
 class PageFold {
 public:
-    /// The page above will have so many halves and quarters of cells, at most.
-    PageFold(uint32_t log2Cells, size_t halves, size_t quarters);
+    /// The pages have so many halves of cells together.
+    PageFold(uint32_t log2Cells, size_t halves);
 
-    /// Adds a page. `octant`: where it is; octants ascend.
-    void add(const PageSurface& page, uint32_t octant);
+    /// Adds a page, its halves of cells. `octant`: where it is; octants ascend.
+    void add(const SurfaceCells& halves, uint32_t octant);
     /// Returns the page above. Nothing may follow.
     PageSurface take();
 
@@ -51,20 +51,16 @@ private:
     PageSurface above_;
 };
 
-/// Returns how many cells so many stored bytes are.
-size_t cellsIn(uint64_t storedBytes);
-
 /// Returns the coarser cells that hold these.
 SurfaceCells foldCells(const SurfaceCells& eighths);
 
-/// Returns cells as bytes, and the cells in such bytes.
-std::vector<std::byte> bytesOf(const SurfaceCells& cells);
-SurfaceCells surfaceCellsFrom(std::span<const std::byte> bytes);
-
-/// Returns a page's surface as it is stored on temporary files, cells as `geometry` and halves as `colour`, and the
-/// surface in what was stored; quarters are left out.
-StoredPage storedSurface(const PageSurface& surface);
-PageSurface surfaceFrom(const StoredPage& stored);
+/// Returns cells as temporary files keep them, as `geometry`: without axes, which follow from the moments; coded where
+/// `isCoded`. Precondition: axes as chooseAxis has them.
+StoredPage storedSurface(const SurfaceCells& cells, bool isCoded);
+/// Returns the cells in what was stored; none where it is not what was stored.
+std::optional<SurfaceCells> surfaceFrom(const StoredPage& stored);
+/// Returns how many cells are in a surface that was stored in so many bytes, before these were coded.
+size_t storedCells(uint64_t geometryBytes);
 
 /// Returns the bytes that surfaceOf needs for triangles with so large areas and perimeters together, in cells: a piece
 /// for each half cell that a triangle touches, and the cells themselves where the pieces come in parts. `halves`: the

@@ -85,7 +85,7 @@ Result<StoredPage> PageSpool::read(const PageEntry& entry) const {
     VCP_TRY(pages_.read(entry.offset + entry.storedBytes, page.colour));
     const bool isIntact =
         entry.hash == hashBytes(page.geometry) && (page.colour.empty() || entry.colourHash == hashBytes(page.colour));
-    if (!isIntact) return damagedTempFile(pages_.path(), entry.offset);
+    if (!isIntact) return damaged(entry);
     return page;
 }
 

@@ -26,6 +26,8 @@ public:
     Result<void> reopen(uint64_t bytes, uint64_t entries);
     /// Returns a page as it was appended. Errors: Io; InvalidInput (damaged).
     Result<StoredPage> read(const PageEntry& entry) const;
+    /// Returns the error that says that a page is damaged.
+    [[nodiscard]] Error damaged(const PageEntry& entry) const { return damagedTempFile(pages_.path(), entry.offset); }
     void remove();
     /// Brings the entries that are in memory into Morton order.
     void sortEntries();

@@ -6,7 +6,8 @@
 
 #include <oneapi/tbb/parallel_for.h>
 #include <xxhash.h>
-#include <zstd.h>
+
+#include "builder/spill/record_coder.h"
 
 namespace vcp {
 
@@ -28,51 +29,6 @@ namespace {
 constexpr size_t kMaxBlockRecords = 4096, kLeastRoomRecords = 8;
 constexpr size_t kHeaderBytes = 40;
 constexpr uint32_t kMaxBins = 1u << 24;
-constexpr int kFastCompression = 1;
-
-/// Writes, word by word, the difference to the record before, folded so that small ones of either sign have high bytes
-/// of zero, one byte plane after the other.
-void toPlanes(const std::byte* records, size_t count, size_t recordBytes, std::byte* planes) {
-    const size_t words = recordBytes / 4;
-    for (size_t w = 0; w < words; ++w) {
-        std::byte* plane = planes + w * 4 * count;
-        uint32_t before = 0;
-        for (size_t i = 0; i < count; ++i) {
-            uint32_t word;
-            std::memcpy(&word, records + i * recordBytes + w * 4, 4);
-            const uint32_t difference = word - before;
-            const uint32_t folded = difference << 1 ^ (0 - (difference >> 31));
-            before = word;
-            for (size_t b = 0; b < 4; ++b) plane[b * count + i] = std::byte(folded >> 8 * b);
-        }
-    }
-}
-
-void fromPlanes(const std::byte* planes, size_t count, size_t recordBytes, std::byte* records) {
-    const size_t words = recordBytes / 4;
-    for (size_t w = 0; w < words; ++w) {
-        const std::byte* plane = planes + w * 4 * count;
-        uint32_t before = 0;
-        for (size_t i = 0; i < count; ++i) {
-            uint32_t folded = 0;
-            for (size_t b = 0; b < 4; ++b) folded |= uint32_t(plane[b * count + i]) << 8 * b;
-            before += folded >> 1 ^ (0 - (folded & 1));
-            std::memcpy(records + i * recordBytes + w * 4, &before, 4);
-        }
-    }
-}
-
-/// Codes records into a block, behind its header, and cuts it to size. Returns false where that saves nothing.
-bool code(const std::vector<std::byte>& records, size_t count, size_t recordBytes, std::vector<std::byte>& block) {
-    std::vector<std::byte> planes(records.size());
-    toPlanes(records.data(), count, recordBytes, planes.data());
-    const size_t stored = ZSTD_compress(block.data() + kHeaderBytes, block.size() - kHeaderBytes, planes.data(),
-                                        planes.size(), kFastCompression);
-    if (ZSTD_isError(stored) || stored == records.size()) return false;
-    block.resize(kHeaderBytes + stored);
-    return true;
-}
-
 }  // namespace
 
 RawBins::RawBins(TempSpace& space, std::string name, size_t recordBytes, size_t bins, uint64_t bufferBytes)
@@ -173,9 +129,10 @@ Result<void> RawBins::makeRoom() {
 // Coding, which takes the time, runs outside of the locks.
 Result<void> RawBins::writeBlock(size_t bin, const std::vector<std::byte>& records) {
     const size_t count = records.size() / recordBytes_;
-    std::vector<std::byte> block(kHeaderBytes + records.size());
-    if (space_.isAmple(records.size()) || !code(records, count, recordBytes_, block))
-        std::memcpy(block.data() + kHeaderBytes, records.data(), records.size());
+    std::vector<std::byte> block(kHeaderBytes);
+    block.reserve(kHeaderBytes + records.size());
+    if (space_.isAmple(records.size()) || !codeRecords(records, recordBytes_, block))
+        block.insert(block.end(), records.begin(), records.end());
     BlockHeader header;
     header.bin = uint32_t(bin);
     header.records = uint32_t(count);
@@ -278,10 +235,8 @@ Result<void> RawBins::read(const Block& block, std::byte* out) const {
                           header.hash == header.hashOfHeader() &&
                           header.payloadHash == XXH3_64bits(payload.data(), payload.size());
     if (isIntact && plain) return {};
-    std::vector<std::byte> planes(isIntact ? block.records * recordBytes_ : 0);
-    if (!isIntact || ZSTD_decompress(planes.data(), planes.size(), payload.data(), payload.size()) != planes.size())
+    if (!isIntact || !decodeRecords(payload, recordBytes_, std::span(out, block.records * recordBytes_)))
         return damagedTempFile(file_.path(), block.offset);
-    fromPlanes(planes.data(), block.records, recordBytes_, out);
     return {};
 }
 

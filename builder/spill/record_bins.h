@@ -1,10 +1,9 @@
 // Bins of fixed-size records on a temporary file: written in any order, read back bin by bin.
 //
-// Each bin fills a block. A full block, and the fullest ones where all together hold too much, is coded (words as
-// differences to the record before, byte planes, zstd at its fastest), or left as it is while there is ample memory,
-// and appended with a header that names its bin and the bin's block before it. So a bin costs a few bytes of memory
-// however many blocks it has, and everything is found again after an interruption. Headers and blocks carry hashes: a
-// temporary disk that returns wrong bytes is noticed.
+// Each bin fills a block. A full block, and the fullest ones where all together hold too much, is coded
+// (record_coder.h), or left as it is while there is ample memory, and appended with a header that names its bin and the
+// bin's block before it. So a bin costs a few bytes of memory however many blocks it has, and everything is found again
+// after an interruption. Headers and blocks carry hashes: a temporary disk that returns wrong bytes is noticed.
 #pragma once
 
 #include <algorithm>

@@ -97,7 +97,7 @@ bool holds(const PageTree& tree, glm::dvec3 p) {
 }
 
 struct FoldedPages {
-    std::vector<PageSurface> finest;  ///< the eight, in octant order, empty ones left out
+    std::vector<SurfaceCells> finest;  ///< the halves of cells of the eight, in octant order, empty ones left out
     std::vector<uint32_t> octants;
     PageSurface above;
 };
@@ -106,12 +106,12 @@ FoldedPages pagesOf(const LatticeMesh& mesh) {
     FoldedPages pages;
     const std::vector<uint32_t> numbers = allOf(mesh);
     for (uint32_t o = 0; o < 8; ++o) {
-        PageSurface surface = surfaceOf(mesh, numbers, mortonDecode(o), kSlabLog2Cells);
-        if (surface.cells.size() == 0) continue;
+        SurfaceCells surface = surfaceOf(mesh, numbers, mortonDecode(o), kSlabLog2Cells);
+        if (surface.size() == 0) continue;
         pages.finest.push_back(std::move(surface));
         pages.octants.push_back(o);
     }
-    PageFold fold(kSlabLog2Cells, 0, 0);
+    PageFold fold(kSlabLog2Cells, 0);
     for (size_t i = 0; i < pages.finest.size(); ++i) fold.add(pages.finest[i], pages.octants[i]);
     pages.above = fold.take();
     return pages;
@@ -129,9 +129,9 @@ TEST(Slabs, HoldEveryPointOfTheSurface) {
             const auto octant = uint32_t(page.x + 2 * page.y + 4 * page.z);
             const auto at = std::find(pages.octants.begin(), pages.octants.end(), octant);
             ASSERT_NE(at, pages.octants.end());
-            const PageSurface& finest = pages.finest[size_t(at - pages.octants.begin())];
-            ASSERT_TRUE(holds(finest.halves, (p - page * kEdge) * 2.0));
-            ASSERT_TRUE(holds(finest.cells, p - page * kEdge));
+            const SurfaceCells& halves = pages.finest[size_t(at - pages.octants.begin())];
+            ASSERT_TRUE(holds(halves, (p - page * kEdge) * 2.0));
+            ASSERT_TRUE(holds(foldCells(halves), p - page * kEdge));
             ASSERT_TRUE(holds(pages.above.cells, p / 2.0));
             ASSERT_TRUE(holds(tree, p / 2.0));
         }
@@ -149,8 +149,8 @@ TEST(Slabs, CellsHaveTheAreaOfTheMesh) {
         }
         const FoldedPages pages = pagesOf(mesh);
         double finest = 0, above = 0;
-        for (const PageSurface& page : pages.finest)
-            for (const CellSurface& cell : page.cells.cells) finest += double(cell.area);
+        for (const SurfaceCells& halves : pages.finest)
+            for (const CellSurface& cell : halves.cells) finest += double(cell.area) / 4;
         for (const CellSurface& cell : pages.above.cells.cells) above += 4 * double(cell.area);
         EXPECT_NEAR(finest, expected, 1e-5 * expected);
         EXPECT_NEAR(above, expected, 1e-5 * expected);
@@ -259,26 +259,35 @@ TEST(Slabs, APageCutPartByPartIsTheSame) {
         SCOPED_TRACE(scene.name);
         for (uint32_t octant = 0; octant < 8; ++octant) {
             const glm::u32vec3 page(octant & 1, octant >> 1 & 1, octant >> 2);
-            const PageSurface surface = surfaceOf(scene.mesh, allOf(scene.mesh), page, kSlabLog2Cells);
-            EXPECT_GE(halvesTouched(scene.mesh, allOf(scene.mesh), page, kSlabLog2Cells), surface.halves.size());
-            const StoredPage whole = storedSurface(surface);
+            const SurfaceCells surface = surfaceOf(scene.mesh, allOf(scene.mesh), page, kSlabLog2Cells);
+            EXPECT_GE(halvesTouched(scene.mesh, allOf(scene.mesh), page, kSlabLog2Cells), surface.size());
+            const StoredPage whole = storedSurface(surface, false);
             for (const size_t pieces : {size_t{0}, size_t{20}}) {
                 const StoredPage parts =
-                    storedSurface(surfaceOf(scene.mesh, allOf(scene.mesh), page, kSlabLog2Cells, pieces));
+                    storedSurface(surfaceOf(scene.mesh, allOf(scene.mesh), page, kSlabLog2Cells, pieces), false);
                 ASSERT_EQ(whole.geometry, parts.geometry) << octant << ", " << pieces << " pieces";
-                ASSERT_EQ(whole.colour, parts.colour) << octant << ", " << pieces << " pieces";
             }
         }
     }
 }
 
 TEST(Slabs, SurfacesComeBackFromTheirBytes) {
-    const FoldedPages pages = pagesOf(scenes()[0].mesh);
-    const SurfaceCells& cells = pages.above.cells;
-    const SurfaceCells again = surfaceCellsFrom(bytesOf(cells));
-    EXPECT_EQ(again.codes, cells.codes);
-    EXPECT_EQ(bytesOf(again), bytesOf(cells));
-    EXPECT_EQ(surfaceCellsFrom({}).size(), 0u);
+    const SurfaceCells& cells = pagesOf(scenes()[0].mesh).above.quarters;
+    ASSERT_GT(cells.size(), 5000u) << "more than a block";
+    const StoredPage plain = storedSurface(cells, false), coded = storedSurface(cells, true);
+    EXPECT_LT(coded.geometry.size(), plain.geometry.size() * 2 / 3);
+    for (const StoredPage& stored : {plain, coded}) {
+        EXPECT_EQ(storedCells(stored.geometryBytes), cells.size());
+        const auto again = surfaceFrom(stored);
+        ASSERT_TRUE(again);
+        EXPECT_EQ(again->codes, cells.codes);
+        EXPECT_EQ(storedSurface(*again, false).geometry, plain.geometry);
+        for (size_t i = 0; i < cells.size(); ++i) ASSERT_EQ(again->cells[i].axis, cells.cells[i].axis);
+        StoredPage cut = stored;
+        cut.geometry.pop_back();
+        EXPECT_FALSE(surfaceFrom(cut));
+    }
+    EXPECT_EQ(storedSurface({}, true).geometry.size(), 0u);
 }
 
 }  // namespace
