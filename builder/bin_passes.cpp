@@ -1,8 +1,10 @@
 #include "builder/bin_passes.h"
 
 #include <sys/resource.h>
+#include <algorithm>
 
 #include <oneapi/tbb/parallel_invoke.h>
+#include <oneapi/tbb/task_arena.h>
 
 #include "builder/dataset_assembly.h"
 #include "builder/lattice/collapsed_triangles.h"
@@ -14,6 +16,15 @@ ColourUse colourUseOf(const BuildOptions& options, const SoupMeasures& measures)
     const bool all = options.colour == ColourChoice::Auto;
     return {.vertices = measures.hasVertexColours && (all || options.colour == ColourChoice::Vertex),
             .materials = measures.hasMaterials && (all || options.colour == ColourChoice::Texture)};
+}
+
+bool mayKeepImages(const BuildOptions& options, const SoupMeasures& measures, std::span<const Material> materials) {
+    const auto hasImage = [](const Material& material) { return material.hasImages(); };
+    return keepsImages(options) && colourUseOf(options, measures).materials && std::ranges::any_of(materials, hasImage);
+}
+
+unsigned threadsOf(const BuildOptions& options) {
+    return options.threads > 0 ? options.threads : unsigned(std::max(1, tbb::this_task_arena::max_concurrency()));
 }
 
 Result<LevelPlan> planLevels(const BuildOptions& options, const SoupMeasures& measures, uint32_t levelsLess) {

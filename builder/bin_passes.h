@@ -3,6 +3,7 @@
 
 #include <deque>
 #include <functional>
+#include <span>
 #include <vector>
 
 #include "builder/build.h"
@@ -19,6 +20,12 @@ struct ColourUse {
     [[nodiscard]] bool any() const { return vertices || materials; }
 };
 ColourUse colourUseOf(const BuildOptions& options, const SoupMeasures& measures);
+
+/// Whether there are images to keep, as far as is known before they are read. `materials`: of all inputs.
+bool mayKeepImages(const BuildOptions& options, const SoupMeasures& measures, std::span<const Material> materials);
+
+/// Returns how many threads a build uses.
+unsigned threadsOf(const BuildOptions& options);
 
 /// Returns the levels of a mesh, with pages of one level at their bottom, and a single bin. Errors: those of
 /// chooseFrame and chooseError.

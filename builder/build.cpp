@@ -15,7 +15,6 @@
 #include <oneapi/tbb/task_arena.h>
 
 #include "builder/bin_passes.h"
-#include "builder/build_until_dealt.h"
 #include "builder/checkpoint.h"
 #include "builder/dataset_assembly.h"
 #include "builder/deal.h"
@@ -25,6 +24,7 @@
 #include "builder/level_plan.h"
 #include "builder/memory_plan.h"
 #include "builder/mesh/open_mesh.h"
+#include "builder/page_plan.h"
 #include "builder/progress_meter.h"
 #include "builder/slab_pages.h"
 #include "builder/spill/journal.h"
@@ -37,9 +37,6 @@ namespace {
 // A level of slabs is built in runs of so many pages, with checkpoints between them.
 constexpr size_t kSlabPagesPerBin = 256;
 
-// A part of a build has about so many bins.
-constexpr unsigned kBinsOfPart = 4;
-
 // Shares of the whole time; what is left after reading, dealing and the vertices is shared by the levels.
 constexpr double kReadingShare = 0.08, kDealingShare = 0.04, kVerticesShare = 0.06, kWritingShare = 0.02;
 // Images come on top of these, by what is expected of them and of the mesh.
@@ -47,11 +44,9 @@ constexpr double kSecondsOfTriangle = 10e-6;
 
 class Builder {
 public:
-    /// `parts`: how many parts will work on the bins; 0: it is a build of its own.
     Builder(const BuildOptions& options, const MemoryPlan& plan, unsigned threads,
-            const std::filesystem::path& tempFolder, unsigned parts = 0)
+            const std::filesystem::path& tempFolder)
         : options_(options),
-          parts_(parts),
           memory_(plan),
           meter_(options.progress),
           space_(tempFolder, plan.tempBytes),
@@ -84,18 +79,6 @@ public:
         }
         if (error.file.empty()) error.file = options_.output.string();
         return error;
-    }
-
-    /// Reads and deals, makes that durable and records it, with what each part will work on.
-    Result<void> runUntilDealt() {
-        return caught([this]() -> Result<void> {
-            VCP_TRY(read());
-            VCP_TRY(chooseGrid(0));
-            warnOfWideCells();
-            VCP_TRY(deal());
-            nlohmann::json fields{{"first bins", firstBinsOfParts()}, {"warnings", report_.warnings}};
-            return journal_.record(space_.folder(), fields);
-        });
     }
 
 private:
@@ -139,9 +122,7 @@ private:
     // Progress and time
 
     bool progress(const std::string& stage, double fraction) {
-        // What has parts ends with dealing.
-        const double whole = parts_ == 0 ? 1 : kReadingShare + kDealingShare;
-        const double withImages = fraction / whole * (1 - imagesShare_) + imagesDone_;
+        const double withImages = fraction * (1 - imagesShare_) + imagesDone_;
         return meter_.report(
             stage, {.fraction = withImages, .triangles = measures_.triangles, .tempBytes = space_.diskBytes()});
     }
@@ -272,21 +253,25 @@ private:
             measures_.triangles = triangles;
             return progress("reading", kReadingShare * fraction);
         };
-        VCP_TRY_ASSIGN(measures_, arena_.execute([&] {
+        VCP_TRY_ASSIGN(const auto tally, arena_.execute([&] {
             return readInputs(options_, space_, memory_.vertexBytes, *files_.soup, report, report_.warnings,
                               report_.sideFiles);
         }));
+        VCP_TRY_ASSIGN(measures_, measuresOf(tally, options_));
         VCP_TRY(checkOutput(options_.output, OutputKind::Dataset, rules()));
         releaseMemory();
-        VCP_TRY(checkSpace());
-        // Images are not kept, so a soup that needs them is dealt before its checkpoint.
-        return files_.soup->materials.empty() ? checkpoint("read", 0) : Result<void>();
+        // Images are not kept, so a soup that needs them is dealt before its checkpoint. What was read is not lost
+        // where there is too little room for the rest.
+        auto checked = checkSpace();
+        if (files_.soup->materials.empty()) VCP_TRY(checkpoint("read", 0, !checked));
+        return checked;
     }
 
     /// Checks the free space now: a disk that is too small would be noticed only after hours.
     Result<void> checkSpace() const {
         const uint64_t images = mayKeepImages() ? expectedImageBytes(files_.soup->materials) : 0;
-        const uint64_t temp = expectedTempBytes(measures_.triangles, images, memory_.tempBytes),
+        const uint64_t soup = files_.soup->floats.raw().bytes() + files_.soup->doubles.raw().bytes();
+        const uint64_t temp = expectedTempBytes(measures_.triangles, soup, images, memory_.tempBytes),
                        there = space_.diskBytes();
         const std::array<SpaceNeed, 2> needs{
             {{space_.folder().path(), temp > there ? temp - there : 0, "temporary folder"},
@@ -310,42 +295,21 @@ private:
         files_.parts = std::make_unique<PartNotes>(space_, memory_.bufferBytes / 16);
     }
 
-    /// Chooses the pages that hold the mesh, their grid once more where these would be too sparse, and the bins.
+    /// Chooses the pages that hold the mesh, and the bins.
     Result<void> choosePlan() {
-        VCP_TRY_ASSIGN(auto choice, choosePagesOnGrid());
-        while (choice.levelsLess > 0) {
-            VCP_TRY(chooseGrid(levelsLess_ + choice.levelsLess));
-            VCP_TRY_ASSIGN(choice, choosePagesOnGrid());
-        }
-        plan_.finest = PagePartition(choice.counts, binTriangles(choice));
-        plan_.setPages(plan_.frame, std::move(choice.pages));
-        finestPages_ = choice.counts.size();
+        const SoupShare all{.soup = *files_.soup};
+        const PagePlanning planning{
+            .options = options_,
+            .measures = measures_,
+            .soups = {&all, 1},
+            .memory = memory_,
+            .mayKeepImages = mayKeepImages(),
+            .progress = [&](double part) { return progress("sorting", kReadingShare + kDealingShare / 2 * part); }};
+        VCP_TRY_ASSIGN(auto chosen, arena_.execute([&] { return planPagesOf(planning); }));
+        plan_ = std::move(chosen.levels);
+        levelsLess_ = chosen.levelsLess;
+        finestPages_ = chosen.pages;
         return planForPages();
-    }
-
-    /// Returns how many triangles a bin may have: parts need several bins each, to be equally large.
-    [[nodiscard]] uint64_t binTriangles(const FinestPageChoice& choice) const {
-        const uint64_t most = memory_.binTriangles(mayKeepImages());
-        if (parts_ == 0) return most;
-        uint64_t all = 0;
-        for (const auto& [page, count] : choice.counts) all += count;
-        return std::min(most, all / (uint64_t{kBinsOfPart} * parts_) + 1);
-    }
-
-    /// Returns the first bin of each part, and the number of bins: runs with about as many triangles each.
-    [[nodiscard]] std::vector<size_t> firstBinsOfParts() const {
-        const size_t bins = plan_.finest.bins();
-        const double total = double(files_.current->raw().total());
-        std::vector<size_t> first{0};
-        double before = 0;
-        for (size_t bin = 0; bin < bins; ++bin) {
-            const double count = double(files_.current->count(bin));
-            while (first.size() < parts_ && before + count / 2 > total * double(first.size()) / parts_)
-                first.push_back(bin);
-            before += count;
-        }
-        first.resize(size_t{parts_} + 1, bins);
-        return first;
     }
 
     Result<void> planForPages() {
@@ -354,29 +318,7 @@ private:
         return {};
     }
 
-    Result<FinestPageChoice> choosePagesOnGrid() {
-        // Pages of soft leaves must be of one level: their levels come from each other by clustering.
-        const PageChoosing choosing{
-            .soup = *files_.soup,
-            .frame = plan_.frame,
-            .mostLevelsBelow = plan_.hasSlabs ? mostLevelsBelow(plan_.frame, measures_) : 0,
-            .mayBeCoarser = plan_.hasSlabs && options_.cell <= 0,
-            .marginCells = plan_.marginCells(),
-            .uncounted = parts_ == 0 ? memory_.binTriangles(mayKeepImages()) : 0,
-            .mostPages = memory_.mostCountedPages(),
-            .progress = [&](double part) { return progress("sorting", kReadingShare + kDealingShare / 2 * part); }};
-        auto choice = arena_.execute([&] { return choosePages(choosing); });
-        // A page that was counted has triangles; twice the memory counts twice as many.
-        if (!choice && choice.error().code == ErrorCode::Limit)
-            return tooLittleMemory(memory_, choice.error().message, 2 * (memory_.fixedBytes + memory_.usableBytes));
-        return choice;
-    }
-
-    /// Whether there are images to keep, as far as is known before they are read.
-    [[nodiscard]] bool mayKeepImages() const {
-        const auto hasImage = [](const Material& material) { return material.hasImages(); };
-        return keepsImages(options_) && colourUse().materials && std::ranges::any_of(files_.soup->materials, hasImage);
-    }
+    [[nodiscard]] bool mayKeepImages() const { return vcp::mayKeepImages(options_, measures_, files_.soup->materials); }
 
     /// Codes the images that the file is to keep. Returns what it has of each of the soup's materials; empty where that
     /// is nothing.
@@ -407,16 +349,6 @@ private:
                                                                          memory_.bufferBytes / 4);
     }
 
-    /// Of scans of one density hardly a triangle is so small.
-    void warnOfTiny(uint64_t tiny) {
-        if (tiny < 100 || tiny < measures_.triangles / 100) return;
-        report_.warnings.push_back(
-            fmt::format("{} of {} triangles are smaller than this file can tell, {:.4g}: they lose their shape; build "
-                        "meshes of very different sizes into files of their own, which a scene shows together, or "
-                        "choose a smaller cell edge",
-                        tiny, measures_.triangles, 2 * plan_.frame.cell / kLatticePerCell));
-    }
-
     Result<void> dealSoup() {
         std::optional<MaterialColours> colours;
         if (colourUse().materials) colours.emplace(files_.soup->materials, memory_.vertexBytes);
@@ -425,7 +357,8 @@ private:
                                      placed);
         const double begins = kReadingShare + kDealingShare / 2;
         std::atomic<uint64_t> tiny = 0;
-        const Dealing dealing{*files_.soup,
+        const SoupShare all{.soup = *files_.soup};
+        const Dealing dealing{{&all, 1},
                               snapper,
                               plan_.gridOf(pass_ - 1),
                               files_.textures.get(),
@@ -435,7 +368,7 @@ private:
                               [&](double part) { return progress("sorting", begins + kDealingShare / 2 * part); }};
         openPass();
         VCP_TRY(arena_.execute([&] { return dealTriangles(dealing, plan_.finest, *files_.current); }));
-        warnOfTiny(tiny);
+        if (auto warning = tinyWarning(tiny, measures_.triangles, plan_.frame)) report_.warnings.push_back(*warning);
         if (colours)
             report_.warnings.insert(report_.warnings.end(), colours->warnings().begin(), colours->warnings().end());
         return {};
@@ -447,7 +380,7 @@ private:
         pass_ = plan_.levels();
         VCP_TRY(dealSoup());
         auto soup = std::move(files_.soup);
-        VCP_TRY(checkpoint("levels", 0, journal_.active() || parts_ > 0));
+        VCP_TRY(checkpoint("levels", 0, journal_.active()));
         soup->floats.raw().remove();
         soup->doubles.raw().remove();
         releaseMemory();
@@ -701,7 +634,6 @@ private:
     }
 
     const BuildOptions& options_;
-    unsigned parts_;
     MemoryPlan memory_;
     ProgressMeter meter_;
     TempSpace space_;
@@ -757,19 +689,9 @@ auto withPlan(const BuildOptions& options, const Work& work) -> decltype(work(op
 
 }  // namespace
 
-unsigned threadsOf(const BuildOptions& options) {
-    return options.threads > 0 ? options.threads : unsigned(std::max(1, tbb::this_task_arena::max_concurrency()));
-}
-
 Result<BuildReport> buildOctree(const BuildOptions& options) {
     return withPlan(options, [](const BuildOptions& all, const MemoryPlan& plan, unsigned threads) {
         return Builder(all, plan, threads, tempFolderOf(all)).run();
-    });
-}
-
-Result<void> buildUntilDealt(const BuildOptions& options, const std::filesystem::path& folder, unsigned parts) {
-    return withPlan(options, [&](const BuildOptions& all, const MemoryPlan& plan, unsigned threads) {
-        return Builder(all, plan, threads, folder, parts).runUntilDealt();
     });
 }
 

@@ -19,14 +19,46 @@ namespace vcp {
 
 namespace {
 
-uint64_t trianglesOf(const Soup& soup) { return soup.floats.raw().total() + soup.doubles.raw().total(); }
+uint64_t trianglesOf(std::span<const SoupShare> soups) {
+    uint64_t triangles = 0;
+    for (const SoupShare& each : soups) triangles += each.triangles();
+    return triangles;
+}
 
-/// Calls visit(piece, its place in an image) for every triangle of the soup on the lattice, then visit.finish(), with a
-/// visit of its own for each block of the soup.
+/// Gives the blocks of one bin, or of all, one after the other.
+class BlockWalk {
+public:
+    static Result<BlockWalk> over(const RawBins& bins, std::optional<size_t> bin) {
+        BlockWalk walk(bins, !bin);
+        if (bin) {
+            VCP_TRY_ASSIGN(walk.listed_, bins.blocks(*bin));
+        }
+        return walk;
+    }
+    /// Returns the next one; none at the end. Errors: RawBins'.
+    Result<std::optional<RawBins::Block>> next() {
+        if (!isOfAll_) return at_ < listed_.size() ? std::optional(listed_[at_++]) : std::nullopt;
+        if (at_ == bins_.bytes()) return std::optional<RawBins::Block>();
+        VCP_TRY_ASSIGN(const auto block, bins_.blockAt(at_));
+        at_ = block.end;
+        return std::optional(block);
+    }
+
+private:
+    BlockWalk(const RawBins& bins, bool isOfAll) : bins_(bins), isOfAll_(isOfAll) {}
+
+    const RawBins& bins_;
+    bool isOfAll_;
+    std::vector<RawBins::Block> listed_;
+    uint64_t at_ = 0;  ///< byte, or number of the listed one
+};
+
+/// Calls visit(piece, its place in an image) for every triangle of the soups on the lattice, then visit.finish(), with
+/// a visit of its own for each block of theirs.
 template <class MakeVisit>
-Result<void> forLatticeTriangles(const Soup& soup, const LatticeSnapper& snapper, bool painted,
+Result<void> forLatticeTriangles(std::span<const SoupShare> soups, const LatticeSnapper& snapper, bool painted,
                                  const std::function<bool(double)>& progress, MakeVisit&& makeVisit) {
-    const uint64_t total = trianglesOf(soup);
+    const uint64_t total = trianglesOf(soups);
     std::atomic<uint64_t> done = 0;
     std::atomic<bool> failed = false, cancelled = false;
     std::mutex mutex;
@@ -35,46 +67,47 @@ Result<void> forLatticeTriangles(const Soup& soup, const LatticeSnapper& snapper
         const std::scoped_lock lock(mutex);
         if (!here && !failed.exchange(true)) result = here;
     };
-    const auto visitBlock = [&](const auto& bins, const RawBins::Block& block) -> Result<void> {
-        VCP_TRY_ASSIGN(const auto records, bins.read(block));
+    const auto visitBlock = [&](const auto& bins, uint32_t before, const RawBins::Block& block) -> Result<void> {
+        VCP_TRY_ASSIGN(auto records, bins.read(block));
         auto visit = makeVisit();
         Result<void> here;
-        for (const auto& t : records)
+        for (auto& t : records) {
+            if (t.material > 0) t.material += before;
             snapper.add(
                 t,
                 [&](const LatticeTriangle& piece, const std::optional<TexturedTriangle>& place) {
                     if (here) here = visit(piece, place);
                 },
                 painted);
+        }
         if (here) here = visit.finish();
         if (!progress(double(done += block.records) / double(total))) cancelled = true;
         return here;
     };
-    const auto all = [&](const auto& bins) {
-        uint64_t at = 0;
+    const auto all = [&](const auto& bins, const SoupShare& share) {
+        auto walk = BlockWalk::over(bins.raw(), share.bin);
+        if (!walk) return end(walk.error());
         const auto next = [&](tbb::flow_control& control) -> RawBins::Block {
-            Result<RawBins::Block> block = RawBins::Block{};
-            if (!cancelled && !failed && at < bins.raw().bytes()) {
-                block = bins.raw().blockAt(at);
-                if (block) {
-                    at = block->end;
-                    return *block;
-                }
-                end(block.error());
+            if (!cancelled && !failed) {
+                const auto block = walk->next();
+                if (block && *block) return **block;
+                if (!block) end(block.error());
             }
             control.stop();
             return {};
         };
         const auto most = size_t(tbb::this_task_arena::max_concurrency()) * 2;
         tbb::parallel_pipeline(most, tbb::make_filter<void, RawBins::Block>(tbb::filter_mode::serial_in_order, next) &
-                                         tbb::make_filter<RawBins::Block, void>(tbb::filter_mode::parallel,
-                                                                                [&](const RawBins::Block& block) {
-                                                                                    if (!cancelled && !failed)
-                                                                                        end(visitBlock(bins, block));
-                                                                                }));
+                                         tbb::make_filter<RawBins::Block, void>(
+                                             tbb::filter_mode::parallel, [&](const RawBins::Block& block) {
+                                                 if (!cancelled && !failed)
+                                                     end(visitBlock(bins, share.materialsBefore, block));
+                                             }));
     };
-    all(soup.floats);
-    all(soup.doubles);
+    for (const SoupShare& each : soups) {
+        all(each.soup.floats, each);
+        all(each.soup.doubles, each);
+    }
     if (result && cancelled) return Error::cancelled();
     return result;
 }
@@ -138,7 +171,7 @@ Result<PageCounts> countTriangles(const PageChoosing& choosing, const FinestPage
     const LatticeBox box = boxOf(parted, pages.gridOf(pages.base()), choosing.marginCells);
     tbb::enumerable_thread_specific<PageCounts> parts;
     std::atomic<uint64_t> counted = 0;
-    VCP_TRY(forLatticeTriangles(choosing.soup, snapper, false, progress, [&] {
+    VCP_TRY(forLatticeTriangles(choosing.soups, snapper, false, progress, [&] {
         return CountVisit{pages, choosing.marginCells, parted, box, parts.local(), counted, choosing.mostPages};
     }));
     PageCounts sums;
@@ -299,7 +332,7 @@ uint32_t levelsTooMany(const PageCounts& pages, uint64_t triangles) {
 
 Result<FinestPageChoice> choosePages(const PageChoosing& choosing) {
     Parting parting({choosing.frame.log2Cells, choosing.frame.levels - 1}, choosing.mostLevelsBelow);
-    const uint64_t triangles = trianglesOf(choosing.soup);
+    const uint64_t triangles = trianglesOf(choosing.soups);
     const uint64_t uncounted =
         choosing.mostLevelsBelow > 0 ? std::min(choosing.uncounted, kMostPageTriangles) : choosing.uncounted;
     FinestPageChoice choice{parting.pages(), {}};
@@ -324,7 +357,7 @@ Result<FinestPageChoice> choosePages(const PageChoosing& choosing) {
 
 Result<void> dealTriangles(const Dealing& dealing, const PagePartition& partition, RecordBins<LatticeTriangle>& bins) {
     const auto deal = [&](auto&& makeVisit) {
-        return forLatticeTriangles(dealing.soup, dealing.snapper, true, dealing.progress, makeVisit);
+        return forLatticeTriangles(dealing.soups, dealing.snapper, true, dealing.progress, makeVisit);
     };
     if (partition.bins() == 1)
         VCP_TRY(deal([&] { return OneBinVisit{bins, TextureBatch(dealing, partition), TinyCount(dealing.tiny)}; }));
@@ -335,6 +368,16 @@ Result<void> dealTriangles(const Dealing& dealing, const PagePartition& partitio
         }));
     if (dealing.textures != nullptr) VCP_TRY(dealing.textures->raw().flush());
     return bins.raw().flush();
+}
+
+// Of scans of one density hardly a triangle is so small.
+std::optional<std::string> tinyWarning(uint64_t tiny, uint64_t triangles, const GridFrame& frame) {
+    if (tiny < 100 || tiny < triangles / 100) return std::nullopt;
+    return fmt::format(
+        "{} of {} triangles are smaller than this file can tell, {:.4g}: they lose their shape; build "
+        "meshes of very different sizes into files of their own, which a scene shows together, or "
+        "choose a smaller cell edge",
+        tiny, triangles, 2 * frame.cell / kLatticePerCell);
 }
 
 }  // namespace vcp

@@ -4,6 +4,9 @@
 #include <atomic>
 #include <cstdint>
 #include <functional>
+#include <optional>
+#include <span>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -36,7 +39,7 @@ struct FinestPageChoice {
 
 /// How pages are chosen. The calling arena's threads do the work.
 struct PageChoosing {
-    const Soup& soup;
+    std::span<const SoupShare> soups;
     GridFrame frame;                       ///< frame of the base level
     uint32_t mostLevelsBelow;              ///< 0: all pages are the base level's
     bool mayBeCoarser;                     ///< whether another base level may be asked for
@@ -52,7 +55,7 @@ Result<FinestPageChoice> choosePages(const PageChoosing& choosing);
 
 /// What is dealt. The calling arena's threads do the work.
 struct Dealing {
-    const Soup& soup;
+    std::span<const SoupShare> soups;
     const LatticeSnapper& snapper;
     PageGrid grid;  ///< grid of the deepest level
     /// Take triangles with images, by the pages that need them; null: there are none.
@@ -67,5 +70,8 @@ struct Dealing {
 /// Deals each triangle to the bins that its corners lie in, where their normals are found. `bins` are flushed. Errors:
 /// Io, Cancelled.
 Result<void> dealTriangles(const Dealing& dealing, const PagePartition& partition, RecordBins<LatticeTriangle>& bins);
+
+/// Returns what to say where so many of a mesh's triangles are `tiny` (Dealing) that it shows; none where they are few.
+std::optional<std::string> tinyWarning(uint64_t tiny, uint64_t triangles, const GridFrame& frame);
 
 }  // namespace vcp

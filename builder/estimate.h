@@ -27,8 +27,8 @@ struct BuildEstimate {
 };
 
 /// Returns the most bytes on the temporary disk, and the bytes of the file, for so many triangles. `imageBytes`: what
-/// images take in the file.
-uint64_t expectedTempBytes(uint64_t triangles, uint64_t imageBytes, uint64_t heldInMemory);
+/// images take in the file. `soupBytes`: what the triangles took as they were read; 0: they were not read.
+uint64_t expectedTempBytes(uint64_t triangles, uint64_t soupBytes, uint64_t imageBytes, uint64_t heldInMemory);
 uint64_t expectedFileBytes(uint64_t triangles);
 
 /// Returns the free bytes where `path`, or the folder it will be in, lies; the largest number when that is unknown.

@@ -11,7 +11,6 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
-#include "builder/lattice/exact_sum.h"
 #include "builder/lattice/lattice_mesh.h"
 #include "builder/mesh/open_mesh.h"
 #include "builder/mesh_sample.h"
@@ -50,10 +49,7 @@ Error badInput(const BuildOptions& options, std::string message) {
 class SoupWriter {
 public:
     /// `sample` is given each triangle; null: there is none.
-    SoupWriter(Soup& soup, MeshSample* sample) : soup_(soup), sample_(sample) {
-        measures_.boundsMin = glm::dvec3(std::numeric_limits<double>::infinity());
-        measures_.boundsMax = -measures_.boundsMin;
-    }
+    SoupWriter(Soup& soup, MeshSample* sample) : soup_(soup), sample_(sample), bin_(soup.firstBin) {}
     ~SoupWriter() {
         // Nobody asks any more what became of the last batches.
         try {
@@ -65,22 +61,23 @@ public:
     SoupWriter& operator=(const SoupWriter&) = delete;
 
     Result<void> add(const WorldTriangle<double>& t) {
-        ++measures_.triangles;
+        SoupMeasures& measures = tally_.counted;
+        ++measures.triangles;
         const glm::dvec3 &a = t.corner[0], &b = t.corner[1], &c = t.corner[2];
-        measures_.boundsMin = glm::min(measures_.boundsMin, glm::min(a, glm::min(b, c)));
-        measures_.boundsMax = glm::max(measures_.boundsMax, glm::max(a, glm::max(b, c)));
+        measures.boundsMin = glm::min(measures.boundsMin, glm::min(a, glm::min(b, c)));
+        measures.boundsMax = glm::max(measures.boundsMax, glm::max(a, glm::max(b, c)));
         const double twice = glm::length(glm::cross(b - a, c - a));
         if (twice == 0) {
-            ++measures_.degenerateTriangles;
+            ++measures.degenerateTriangles;
             return {};
         }
         if (sample_ != nullptr) sample_->addTriangle(t);
         const double longest = longestEdge(a, b, c);
         if (std::isfinite(twice) && std::isfinite(longest)) {
-            area_.add(twice / 2);
-            length_.add(longest);
+            tally_.area.add(twice / 2);
+            tally_.length.add(longest);
         } else {
-            tooLarge_ = true;
+            tally_.isTooLarge = true;
         }
         return store(t);
     }
@@ -91,14 +88,8 @@ public:
         return wait();
     }
 
-    [[nodiscard]] bool tooLarge() const { return tooLarge_; }
-    [[nodiscard]] uint64_t triangles() const { return measures_.triangles; }
-    [[nodiscard]] SoupMeasures measures() const {
-        SoupMeasures m = measures_;
-        m.area = area_.value();
-        m.length = length_.value();
-        return m;
-    }
+    [[nodiscard]] uint64_t triangles() const { return tally_.counted.triangles; }
+    [[nodiscard]] const SoupTally& tally() const { return tally_; }
 
 private:
     Result<void> store(const WorldTriangle<double>& t) {
@@ -124,12 +115,13 @@ private:
 
     void handOn() {
         ++batches_;
-        coding_.run([this, floats = std::move(floats_), doubles = std::move(doubles_)] {
-            auto done = soup_.doubles.append(0, doubles);
-            if (done) done = soup_.floats.append(0, floats);
+        coding_.run([this, bin = bin_, floats = std::move(floats_), doubles = std::move(doubles_)] {
+            auto done = soup_.doubles.append(bin, doubles);
+            if (done) done = soup_.floats.append(bin, floats);
             const std::scoped_lock lock(mutex_);
             if (coded_) coded_ = std::move(done);
         });
+        bin_ = bin_ < soup_.lastBin ? bin_ + 1 : soup_.firstBin;
         floats_.clear();
         doubles_.clear();
         floats_.reserve(kBatch);
@@ -145,9 +137,8 @@ private:
 
     Soup& soup_;
     MeshSample* sample_;
-    SoupMeasures measures_;
-    ExactSum area_, length_;
-    bool tooLarge_ = false;
+    size_t bin_;  ///< of the next batch
+    SoupTally tally_;
     std::vector<WorldTriangle<float>> floats_;
     std::vector<WorldTriangle<double>> doubles_;
 
@@ -159,9 +150,29 @@ private:
 
 }  // namespace
 
-Result<SoupMeasures> readInputs(const BuildOptions& options, TempSpace& space, uint64_t vertexBytes, Soup& soup,
-                                const std::function<bool(double, uint64_t)>& progress,
-                                std::vector<std::string>& warnings, std::vector<SideFile>& sideFiles) {
+SoupTally::SoupTally() {
+    counted.boundsMin = glm::dvec3(std::numeric_limits<double>::infinity());
+    counted.boundsMax = -counted.boundsMin;
+}
+
+void SoupTally::add(const SoupTally& other) {
+    const SoupMeasures& more = other.counted;
+    counted.boundsMin = glm::min(counted.boundsMin, more.boundsMin);
+    counted.boundsMax = glm::max(counted.boundsMax, more.boundsMax);
+    counted.triangles += more.triangles;
+    counted.degenerateTriangles += more.degenerateTriangles;
+    counted.cutTriangles += more.cutTriangles;
+    counted.vertices += more.vertices;
+    counted.hasVertexColours |= more.hasVertexColours;
+    counted.hasMaterials |= more.hasMaterials;
+    area.add(other.area);
+    length.add(other.length);
+    isTooLarge |= other.isTooLarge;
+}
+
+Result<SoupTally> readInputs(const BuildOptions& options, TempSpace& space, uint64_t vertexBytes, Soup& soup,
+                             const std::function<bool(double, uint64_t)>& progress, std::vector<std::string>& warnings,
+                             std::vector<SideFile>& sideFiles) {
     uint64_t totalBytes = 0, doneBytes = 0, vertices = 0, cutTriangles = 0;
     bool hasVertexColours = false;
     const bool isPainted = options.colour == ColourChoice::Auto || options.colour == ColourChoice::Texture;
@@ -229,21 +240,28 @@ Result<SoupMeasures> readInputs(const BuildOptions& options, TempSpace& space, u
     VCP_TRY(soup.floats.raw().flush());
     VCP_TRY(soup.doubles.raw().flush());
 
-    SoupMeasures m = writer.measures();
-    m.vertices = vertices;
-    m.cutTriangles = cutTriangles;
-    m.hasVertexColours = hasVertexColours;
-    m.hasMaterials = std::any_of(soup.materials.begin(), soup.materials.end(), [](const Material& material) {
-        return material.factor != kWhite || material.hasImages();
-    });
+    SoupTally tally = writer.tally();
+    tally.counted.vertices = vertices;
+    tally.counted.cutTriangles = cutTriangles;
+    tally.counted.hasVertexColours = hasVertexColours;
+    tally.counted.hasMaterials =
+        std::any_of(soup.materials.begin(), soup.materials.end(),
+                    [](const Material& material) { return material.factor != kWhite || material.hasImages(); });
+    return tally;
+}
+
+Result<SoupMeasures> measuresOf(const SoupTally& tally, const BuildOptions& options) {
+    SoupMeasures m = tally.counted;
+    m.area = tally.area.value();
+    m.length = tally.length.value();
     if (m.triangles == 0)
-        return badInput(options, cutTriangles > 0 ? "has no triangles but those that masks cut out; keep them whole"
-                                                  : "has no triangles");
-    if (writer.tooLarge() || !(glm::length(m.boundsMax - m.boundsMin) < kMaxExtent) || !std::isfinite(m.area))
+        return badInput(options, m.cutTriangles > 0 ? "has no triangles but those that masks cut out; keep them whole"
+                                                    : "has no triangles");
+    if (tally.isTooLarge || !(glm::length(m.boundsMax - m.boundsMin) < kMaxExtent) || !std::isfinite(m.area))
         return badInput(options, "its coordinates are too large to measure lengths; scale the mesh down");
     if (m.triangles == m.degenerateTriangles || m.area == 0)
         return badInput(options, fmt::format("none of its {} triangles has an area", m.triangles));
-    if (options.colour == ColourChoice::Vertex && !hasVertexColours)
+    if (options.colour == ColourChoice::Vertex && !m.hasVertexColours)
         return badInput(options, "has no vertex colours; choose another colour to keep");
     if (options.colour == ColourChoice::Texture && !m.hasMaterials)
         return badInput(options, "has no materials with a colour or a texture; choose another colour to keep");

@@ -5,11 +5,13 @@
 #include <cmath>
 #include <functional>
 #include <memory>
+#include <optional>
 
 #include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
 
 #include "builder/build.h"
+#include "builder/lattice/exact_sum.h"
 #include "builder/lattice/soup.h"
 #include "builder/mask/mask_cutter.h"
 #include "builder/mask/mask_detail.h"
@@ -49,28 +51,55 @@ struct SoupMeasures {
     bool hasMaterials = false;  ///< some have a colour other than white, or an image
 };
 
+/// The same while it is found out, or of some of the inputs.
+struct SoupTally {
+    SoupMeasures counted;  ///< without area and length
+    ExactSum area, length;
+    bool isTooLarge = false;  ///< some lengths or areas are no finite doubles
+
+    SoupTally();
+    void add(const SoupTally& other);
+};
+
+/// Returns what all triangles together are. Errors: InvalidInput (there are none, or none that a build can use).
+Result<SoupMeasures> measuresOf(const SoupTally& tally, const BuildOptions& options);
+
 /// Returns the length of a triangle's longest edge.
 inline double longestEdge(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c) {
     return std::sqrt(std::max({glm::dot(b - a, b - a), glm::dot(c - b, c - b), glm::dot(a - c, a - c)}));
 }
 
-/// The triangles of all inputs. Most files hold floats, which take half the room.
+/// The triangles of inputs. Most files hold floats, which take half the room.
 struct Soup {
-    Soup(TempSpace& space, uint64_t bufferBytes)
-        : floats(space, "floats", 1, bufferBytes / 2), doubles(space, "doubles", 1, bufferBytes / 2) {}
+    /// `bins`: what is read next goes to bins firstBin to lastBin, a batch to each in turn.
+    Soup(TempSpace& space, uint64_t bufferBytes, size_t bins = 1)
+        : floats(space, "floats", bins, bufferBytes / 2), doubles(space, "doubles", bins, bufferBytes / 2) {}
 
     RecordBins<WorldTriangle<float>> floats;
     RecordBins<WorldTriangle<double>> doubles;
-    std::vector<Material> materials;  ///< materials of all inputs
+    size_t firstBin = 0, lastBin = 0;
+    std::vector<Material> materials;  ///< materials of all these inputs
+};
+
+/// Triangles of a soup: all, or those of one bin.
+struct SoupShare {
+    const Soup& soup;
+    std::optional<size_t> bin = {};
+    uint32_t materialsBefore = 0;  ///< of soups before this one: its triangles count theirs from here
+
+    [[nodiscard]] uint64_t triangles() const {
+        if (bin) return soup.floats.count(*bin) + soup.doubles.count(*bin);
+        return soup.floats.raw().total() + soup.doubles.raw().total();
+    }
 };
 
 /// Reads all inputs into `soup` (flushed), cut by the masks of their materials. `vertexBytes`: memory for the vertices
 /// of one input; masks take up to a quarter as much beside them. An input with masks is read twice. `progress` is given
 /// the fraction read; false cancels. Triangles without area are counted and left out. `warnings` lists what the readers
 /// left out, `sideFiles` the files that the inputs name, each once. Uses the calling arena's threads.
-Result<SoupMeasures> readInputs(const BuildOptions& options, TempSpace& space, uint64_t vertexBytes, Soup& soup,
-                                const std::function<bool(double fraction, uint64_t triangles)>& progress,
-                                std::vector<std::string>& warnings, std::vector<SideFile>& sideFiles);
+Result<SoupTally> readInputs(const BuildOptions& options, TempSpace& space, uint64_t vertexBytes, Soup& soup,
+                             const std::function<bool(double fraction, uint64_t triangles)>& progress,
+                             std::vector<std::string>& warnings, std::vector<SideFile>& sideFiles);
 
 /// Returns what MaskCutter::setDetail() is to be given for an input with masks, whose vertices are read for that; 0
 /// where it can be read only once. `progress` returning false cancels. Errors: as those of MeshStream.

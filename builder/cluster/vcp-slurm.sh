@@ -24,8 +24,8 @@ parts=$(sed -n 's/^ *"parts": \([0-9]*\),*$/\1/p' "$plan/plan.json")
 mkdir -p "$plan/logs"
 
 after=
-for stage in deal vertices pages merge; do
-    case $stage in vertices | pages) last=$((parts - 1)) ;; *) last=0 ;; esac
+for stage in read count deal vertices pages merge; do
+    case $stage in count | merge) last=0 ;; *) last=$((parts - 1)) ;; esac
     after=$(sbatch --parsable --job-name="vcp-$stage" --array="0-$last" --kill-on-invalid-dep=yes \
         ${after:+--dependency=afterok:$after} --output="$plan/logs/$stage-%a.txt" "$@" \
         "$0" --part "$vcp" "$stage" "$plan")

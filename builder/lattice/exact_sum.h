@@ -5,7 +5,8 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
-#include <memory>
+#include <span>
+#include <vector>
 
 namespace vcp {
 
@@ -17,6 +18,21 @@ public:
         const uint64_t exponent = bits >> 52 & 0x7ff;
         const uint64_t fraction = bits & ((uint64_t{1} << 52) - 1);
         parts_[exponent] += exponent == 0 ? fraction : fraction | uint64_t{1} << 52;
+    }
+    void add(const ExactSum& other) {
+        for (size_t e = 0; e < parts_.size(); ++e) parts_[e] += other.parts_[e];
+    }
+    /// Adds the words of another sum.
+    void add(std::span<const uint64_t> words) {
+        for (size_t i = 0; i + 3 <= words.size(); i += 3)
+            parts_[words[i] % parts_.size()] += static_cast<unsigned __int128>(words[i + 1]) << 64 | words[i + 2];
+    }
+    /// Returns the sum, exactly: of each exponent that occurs three words.
+    [[nodiscard]] std::vector<uint64_t> words() const {
+        std::vector<uint64_t> words;
+        for (size_t e = 0; e < parts_.size(); ++e)
+            if (parts_[e] != 0) words.insert(words.end(), {e, uint64_t(parts_[e] >> 64), uint64_t(parts_[e])});
+        return words;
     }
     /// Returns the rounded sum; the same for the same numbers in any order.
     [[nodiscard]] double value() const {

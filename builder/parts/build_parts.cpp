@@ -7,9 +7,8 @@
 #include <oneapi/tbb/global_control.h>
 #include <oneapi/tbb/task_arena.h>
 
-#include "builder/build_until_dealt.h"
 #include "builder/mesh/open_mesh.h"
-#include "builder/parts/part_steps.h"
+#include "builder/parts/part_dealing.h"
 #include "octree/io/caught.h"
 #include "octree/io/durable_file.h"
 #include "octree/io/output_file.h"
@@ -65,56 +64,59 @@ Result<void> checkStep(const PartStep& step, const PartPlan& plan) {
         if (step.number < stage.parts) return {};
         return usage(fmt::format("stage {} has parts 0 to {}", stage.name, stage.parts - 1), step.folder);
     }
-    return usage(fmt::format("there is no stage \"{}\"; they are deal, vertices, pages, merge", step.stage),
-                 step.folder);
+    return usage(
+        fmt::format("there is no stage \"{}\"; they are read, count, deal, vertices, pages, merge", step.stage),
+        step.folder);
 }
 
 /// Checks a part that is done: another memory, or another machine's, may have dealt into other bins since.
 Result<void> checkDone(const PartStep& step, const PartPlan& plan) {
-    if (step.stage == "deal" || !isDone({step.folder, "deal", 0})) return {};
-    VCP_TRY_ASSIGN(const auto context, openDealt(step.folder, plan));
+    if (step.stage == "read" || step.stage == "count" || !isDone({step.folder, "count", 0})) return {};
+    VCP_TRY_ASSIGN(const auto context, openCounted({step.folder, plan}));
     const auto opened = context.open(step.stage, step.number);
     return opened ? Result<void>() : opened.error();
 }
 
-Result<PartReport> run(const PartStep& step, const PartPlan& plan, const std::function<bool(double)>& progress) {
+/// Runs a part in the calling arena.
+Result<PartReport> runStage(const PartStep& step, const PartSetting& setting) {
     PartReport report;
-    const PartName name{step.folder, step.stage, step.number};
-    NewPart made(name);
-    if (step.stage == "deal") {
-        VCP_TRY(checkInputs(plan));
-        VCP_TRY(buildUntilDealt(plan.options, made.folder(), plan.parts));
-        VCP_TRY(made.rename());
+    NewPart made(setting.part(step.stage, step.number));
+    if (step.stage == "read") {
+        VCP_TRY(runRead(setting, step.number, made));
         return report;
     }
-    VCP_TRY_ASSIGN(auto context, openContext(step.folder, plan));
-    context.progress = &progress;
+    if (step.stage == "count") {
+        VCP_TRY(runCount(setting, made));
+        return report;
+    }
+    VCP_TRY_ASSIGN(const auto context, openContext(setting));
+    if (step.stage == "deal") {
+        VCP_TRY(runDeal(context, step.number, made));
+    } else if (step.stage == "vertices") {
+        VCP_TRY(runVertices(context, step.number, made));
+    } else if (step.stage == "pages") {
+        VCP_TRY(runPages(context, step.number, made));
+    } else {
+        VCP_TRY_ASSIGN(report.warnings, warningsOf(context));
+        VCP_TRY_ASSIGN(report.dataset, runMerge(context, made));
+    }
+    return report;
+}
+
+Result<PartReport> run(const PartStep& step, const PartPlan& plan, const std::function<bool(double)>& progress) {
+    const unsigned threads = threadsOf(plan.options);
     std::optional<oneapi::tbb::global_control> more;
     using Control = oneapi::tbb::global_control;
-    if (context.threads > Control::active_value(Control::max_allowed_parallelism))
-        more.emplace(Control::max_allowed_parallelism, context.threads);
-    oneapi::tbb::task_arena arena{int(context.threads)};
-    Result<void> done;
-    arena.execute([&] {
-        if (step.stage == "vertices") {
-            done = runVertices(context, step.number, made);
-        } else if (step.stage == "pages") {
-            done = runPages(context, step.number, made);
-        } else {
-            auto figures = runMerge(context, made);
-            if (figures) report.dataset = *figures;
-            if (!figures) done = figures.error();
-        }
-    });
-    VCP_TRY(done);
-    if (report.dataset) report.warnings = context.dealt.fields.at("warnings").get<std::vector<std::string>>();
-    return report;
+    if (threads > Control::active_value(Control::max_allowed_parallelism))
+        more.emplace(Control::max_allowed_parallelism, threads);
+    oneapi::tbb::task_arena arena{int(threads)};
+    return arena.execute([&] { return runStage(step, {step.folder, plan, &progress}); });
 }
 
 }  // namespace
 
 std::vector<PartStage> stagesOf(unsigned parts) {
-    return {{"deal", 1}, {"vertices", parts}, {"pages", parts}, {"merge", 1}};
+    return {{"read", parts}, {"count", 1}, {"deal", parts}, {"vertices", parts}, {"pages", parts}, {"merge", 1}};
 }
 
 Result<std::filesystem::path> planParts(const BuildOptions& options, unsigned parts) {

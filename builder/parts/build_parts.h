@@ -2,7 +2,9 @@
 //
 // planParts writes a folder that all machines see. Then each stage runs its parts, in any order and at the same time,
 // once all parts of the stage before are done:
-//   deal      1 part   reads the inputs, chooses the pages, deals triangles into bins
+//   read      P parts  each reads some of the inputs
+//   count     1 part   chooses the pages and the bins, and codes images
+//   deal      P parts  each deals its share of the triangles into bins
 //   vertices  P parts  each finds the normals in its run of bins, and which parts of the mesh are closed
 //   pages     P parts  each builds the pages of its bins, and above these all that have nothing of other parts
 //   merge     1 part   builds the few pages that are left, and writes the file

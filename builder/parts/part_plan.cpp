@@ -109,17 +109,14 @@ Result<std::vector<PlannedInput>> describeInputs(const std::vector<std::filesyst
     return inputs;
 }
 
-Result<void> checkInputs(const PartPlan& plan) {
-    for (const PlannedInput& each : plan.inputs) {
-        // A copy, or another machine's clock, changes the times alone: then the bytes decide.
-        if (fileStamp(each.path) == each.stamp) continue;
-        VCP_TRY_ASSIGN(const auto hash, hashOfFile(each.path));
-        if (hash != each.hash)
-            return Error{.code = ErrorCode::Usage,
-                         .message = "was changed since the build was planned; plan it again",
-                         .file = each.path.string()};
-    }
-    return {};
+Result<void> checkInput(const PlannedInput& input) {
+    // A copy, or another machine's clock, changes the times alone: then the bytes decide.
+    if (fileStamp(input.path) == input.stamp) return {};
+    VCP_TRY_ASSIGN(const auto hash, hashOfFile(input.path));
+    if (hash == input.hash) return {};
+    return Error{.code = ErrorCode::Usage,
+                 .message = "was changed since the build was planned; plan it again",
+                 .file = input.path.string()};
 }
 
 Result<void> writePlan(const PartPlan& plan, const std::filesystem::path& folder) {

@@ -32,8 +32,8 @@ Result<std::string> programId();
 
 /// Describes the inputs as they are. Reads all of them. Errors: Io.
 Result<std::vector<PlannedInput>> describeInputs(const std::vector<std::filesystem::path>& paths);
-/// Errors: Usage (an input was changed).
-Result<void> checkInputs(const PartPlan& plan);
+/// Errors: Usage (the input was changed).
+Result<void> checkInput(const PlannedInput& input);
 
 /// Errors: Io, Usage (a name that is not UTF-8).
 Result<void> writePlan(const PartPlan& plan, const std::filesystem::path& folder);

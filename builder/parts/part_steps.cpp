@@ -19,22 +19,6 @@ namespace {
 
 using nlohmann::json;
 
-/// Bins of a part that is done.
-template <class Record>
-Result<std::unique_ptr<RecordBins<Record>>> openBins(const DonePart& part, const std::string& name, size_t bins) {
-    auto opened = std::make_unique<RecordBins<Record>>(*part.space, name, bins, 0);
-    if (const uint64_t bytes = part.fields.at("files").at(name).get<uint64_t>(); bytes > 0)
-        VCP_TRY(opened->raw().reopen(bytes));
-    return opened;
-}
-
-/// Makes bins durable and notes their length.
-Result<void> record(RawBins& bins, const std::string& name, json& files) {
-    VCP_TRY(bins.sync());
-    files[name] = bins.bytes();
-    return {};
-}
-
 /// Makes the spools of all levels durable; returns their lengths, in bytes and entries.
 Result<json> recordedSpools(std::deque<PageSpool>& spools) {
     json lengths = json::array();
@@ -67,41 +51,72 @@ std::deque<PageSpool> makeSpools(TempSpace& space, uint32_t levels, const char* 
     return spools;
 }
 
-/// Returns the parts whose bins have any of the triangles or vertices.
-std::vector<unsigned> partsWith(const PartContext& context, const RawBins& triangles, const RawBins& vertices) {
-    std::vector<unsigned> parts;
-    for (unsigned part = 0; part < context.plan.parts; ++part)
-        for (size_t bin = context.firstBins[part]; bin < context.firstBins[part + 1]; ++bin)
-            if (triangles.count(bin) + vertices.count(bin) > 0) {
-                parts.push_back(part);
-                break;
-            }
-    return parts;
-}
+/// Bins of one kind that the parts of a stage left, for those that have anything for a part.
+template <class Record>
+class GatheredBins {
+public:
+    /// `field`: which lists the parts that there is anything for.
+    static Result<GatheredBins> open(const PartContext& context, const std::string& stage, const char* field,
+                                     const std::string& name, unsigned number) {
+        GatheredBins all;
+        for (unsigned k = 0; k < context.plan.parts; ++k) {
+            VCP_TRY_ASSIGN(auto part, context.open(stage, k));
+            const auto wanted = part.fields.at(field).template get<std::vector<unsigned>>();
+            if (std::find(wanted.begin(), wanted.end(), number) == wanted.end()) continue;
+            auto bins = std::make_unique<RecordBins<Record>>(*part.space, name, context.levels.finest.bins(), 0);
+            VCP_TRY(reopenBins(part, name, bins->raw()));
+            all.sources_.push_back({k, std::move(part), std::move(bins)});
+        }
+        return all;
+    }
+    /// Calls visit(records, number of the part that they are of) for each part's records of a bin.
+    template <class Visit>
+    Result<void> load(size_t bin, const Visit& visit) const {
+        for (const Source& from : sources_) {
+            VCP_TRY_ASSIGN(auto records, from.bins->load(bin));
+            visit(std::move(records), from.part);
+        }
+        return {};
+    }
+    [[nodiscard]] Result<std::vector<Record>> load(size_t bin) const {
+        std::vector<Record> all;
+        VCP_TRY(load(bin, [&](std::vector<Record> records, unsigned) {
+            if (all.empty())
+                all = std::move(records);
+            else
+                all.insert(all.end(), records.begin(), records.end());
+        }));
+        return all;
+    }
+
+private:
+    struct Source {
+        unsigned part;
+        DonePart done;
+        std::unique_ptr<RecordBins<Record>> bins;
+    };
+    std::vector<Source> sources_;
+};
 
 /// What the vertices' stage left for the bins of a part, all of its parts together.
 class FinestBins {
 public:
     static Result<FinestBins> open(const PartContext& context, unsigned number) {
         FinestBins all;
-        const size_t bins = context.levels.finest.bins();
+        all.folder_ = context.folder;
+        VCP_TRY_ASSIGN(all.triangles_, Triangles::open(context, "vertices", "for", "level", number));
+        VCP_TRY_ASSIGN(all.vertices_, Vertices::open(context, "vertices", "for", "normals", number));
+        std::vector<DonePart> parts;
+        std::vector<std::unique_ptr<PartNotes>> notes;
+        std::vector<PartNotes*> joined;
         for (unsigned k = 0; k < context.plan.parts; ++k) {
             VCP_TRY_ASSIGN(auto part, context.open("vertices", k));
-            all.parts_.push_back(std::move(part));
-            const DonePart& done = all.parts_.back();
-            const auto wanted = done.fields.at("for").get<std::vector<unsigned>>();
-            if (std::find(wanted.begin(), wanted.end(), number) != wanted.end()) {
-                VCP_TRY_ASSIGN(auto triangles, openBins<LatticeTriangle>(done, "level", bins));
-                VCP_TRY_ASSIGN(auto vertices, openBins<VertexImage>(done, "normals", bins));
-                all.sources_.push_back({k, std::move(triangles), std::move(vertices)});
-            }
-            all.notes_.push_back(std::make_unique<PartNotes>(*done.space, 0));
-            if (const uint64_t bytes = done.fields.at("files").at("parts").get<uint64_t>(); bytes > 0)
-                VCP_TRY(all.notes_.back()->raw().reopen(bytes));
+            notes.push_back(std::make_unique<PartNotes>(*part.space, 0));
+            VCP_TRY(reopenBins(part, "parts", notes.back()->raw()));
+            joined.push_back(notes.back().get());
+            parts.push_back(std::move(part));
         }
-        std::vector<PartNotes*> notes;
-        for (const auto& each : all.notes_) notes.push_back(each.get());
-        VCP_TRY_ASSIGN(all.meshParts_, PartNotes::join(notes));
+        VCP_TRY_ASSIGN(all.meshParts_, PartNotes::join(joined));
         return all;
     }
 
@@ -110,48 +125,31 @@ public:
     /// Returns the triangles of a bin, with their normals. Errors: Io, InvalidInput.
     [[nodiscard]] Result<std::vector<LatticeTriangle>> load(size_t bin) const {
         std::vector<LatticeTriangle> soup;
-        std::vector<VertexImage> known;
-        for (const Source& from : sources_) {
-            VCP_TRY_ASSIGN(auto triangles, from.triangles->load(bin));
-            for (LatticeTriangle& t : triangles) t.part = meshParts_.decided(t.part, from.part);
+        VCP_TRY(triangles_.load(bin, [&](std::vector<LatticeTriangle> triangles, unsigned part) {
+            for (LatticeTriangle& t : triangles) t.part = meshParts_.decided(t.part, part);
             soup.insert(soup.end(), triangles.begin(), triangles.end());
-            VCP_TRY_ASSIGN(const auto vertices, from.vertices->load(bin));
-            known.insert(known.end(), vertices.begin(), vertices.end());
-        }
+        }));
+        VCP_TRY_ASSIGN(auto known, vertices_.load(bin));
         if (joinVertices(soup, std::move(known))) return soup;
         return Error{.code = ErrorCode::InvalidInput,
                      .message = "lack a normal that one of them must have; delete these folders and run them again",
-                     .file = (parts_.front().space->folder().path().parent_path() / "vertices-*").string()};
+                     .file = (folder_ / "vertices-*").string()};
     }
 
 private:
-    struct Source {
-        unsigned part;
-        std::unique_ptr<RecordBins<LatticeTriangle>> triangles;
-        std::unique_ptr<RecordBins<VertexImage>> vertices;
-    };
-    std::vector<DonePart> parts_;
-    std::vector<Source> sources_;  ///< those that have anything for the part
-    std::vector<std::unique_ptr<PartNotes>> notes_;
+    using Triangles = GatheredBins<LatticeTriangle>;
+    using Vertices = GatheredBins<VertexImage>;
+    std::filesystem::path folder_;
+    Triangles triangles_;
+    Vertices vertices_;
     MeshParts meshParts_;
 };
 
-/// Returns what `deal` left of triangles with images; null where the file keeps none.
-Result<std::unique_ptr<RecordBins<TexturedTriangle>>> openTextures(const PartContext& context) {
-    std::unique_ptr<RecordBins<TexturedTriangle>> textures;
-    const auto recorded = context.recorded.files.bins.find("textures");
-    if (recorded == context.recorded.files.bins.end()) return textures;
-    textures = std::make_unique<RecordBins<TexturedTriangle>>(*context.dealt.space, "textures",
-                                                              context.levels.finest.bins(), 0);
-    if (recorded->second > 0) VCP_TRY(textures->raw().reopen(recorded->second));
-    return textures;
-}
-
-/// Opens the images that `deal` left; none where the file keeps none.
+/// Opens the images that `count` left; none where the file keeps none.
 Result<std::deque<PageSpool>> openImages(const PartContext& context) {
     std::deque<PageSpool> images;
     for (const auto& [bytes, entries] : context.recorded.files.images) {
-        images.emplace_back(*context.dealt.space, uint32_t(images.size()), "image");
+        images.emplace_back(*context.counted.space, uint32_t(images.size()), "image");
         if (bytes > 0) VCP_TRY(images.back().reopen(bytes, entries));
     }
     return images;
@@ -191,12 +189,41 @@ Result<void> buildAbove(const PartContext& context, unsigned part, TempSpace& sp
 
 }  // namespace
 
+Result<MemoryPlan> PartSetting::divideMemory() const {
+    const uint64_t memory = plan.options.memoryBytes > 0 ? plan.options.memoryBytes : defaultMemoryBytes();
+    return planMemory(memory, threadsOf(plan.options));
+}
+
+Result<void> recordBins(RawBins& bins, const std::string& name, json& files) {
+    VCP_TRY(bins.sync());
+    files[name] = bins.bytes();
+    return {};
+}
+
+Result<void> reopenBins(const DonePart& part, const std::string& name, RawBins& bins) {
+    const auto bytes = part.fields.at("files").at(name).get<uint64_t>();
+    return bytes > 0 ? bins.reopen(bytes) : Result<void>();
+}
+
+std::vector<unsigned> partsWith(const PartContext& context, std::initializer_list<const RawBins*> bins) {
+    const auto hasAny = [&](unsigned part) {
+        for (size_t bin = context.firstBins[part]; bin < context.firstBins[part + 1]; ++bin)
+            for (const RawBins* each : bins)
+                if (each->count(bin) > 0) return true;
+        return false;
+    };
+    std::vector<unsigned> parts;
+    for (unsigned part = 0; part < context.plan.parts; ++part)
+        if (hasAny(part)) parts.push_back(part);
+    return parts;
+}
+
 Result<DonePart> PartContext::open(const std::string& stage, unsigned number) const {
     const PartName name = part(stage, number);
     VCP_TRY_ASSIGN(auto done, openPart(name));
     if (done.fields.value("bins", "") == bins) return done;
     return Error{.code = ErrorCode::Usage,
-                 .message = fmt::format("was made before \"deal 0\" was run again, with other bins; delete it and run "
+                 .message = fmt::format("was made before \"count 0\" was run again, with other bins; delete it and run "
                                         "the step \"{}\" of this plan again",
                                         name.step()),
                  .file = name.folder().string()};
@@ -217,34 +244,33 @@ LevelSettings PartContext::settingsOf(int level, bool isFinest, TempSpace& space
     return settings;
 }
 
-Result<PartContext> openDealt(const std::filesystem::path& folder, const PartPlan& plan) {
+Result<PartContext> openCounted(const PartSetting& setting) {
     PartContext context;
-    context.folder = folder;
-    context.plan = plan;
-    VCP_TRY_ASSIGN(context.dealt, openPart(context.part("deal", 0)));
-    const std::filesystem::path journal = context.part("deal", 0).folder() / kJournalName;
-    VCP_TRY_ASSIGN(context.recorded, recordedFrom(context.dealt.fields, journal));
-    context.firstBins = context.dealt.fields.at("first bins").get<std::vector<size_t>>();
-    if (context.firstBins.size() != size_t{plan.parts} + 1) return damagedTempFile(journal);
+    static_cast<PartSetting&>(context) = setting;
+    VCP_TRY_ASSIGN(context.counted, openPart(context.part("count", 0)));
+    const std::filesystem::path journal = context.part("count", 0).folder() / kJournalName;
+    VCP_TRY_ASSIGN(context.recorded, recordedFrom(context.counted.fields, journal));
+    context.firstBins = context.counted.fields.at("first bins").get<std::vector<size_t>>();
+    if (context.firstBins.size() != size_t{context.plan.parts} + 1) return damagedTempFile(journal);
     const Recorded& recorded = context.recorded;
-    const std::string chosen = json{recorded.levelsLess, recorded.parted, recorded.partition, context.firstBins}.dump();
+    const std::string chosen = json{recorded.levelsLess, recorded.parted, recorded.partition, context.firstBins,
+                                    context.counted.fields.at("placed")}
+                                   .dump();
     context.bins = fmt::format("{:016x}", XXH3_64bits(chosen.data(), chosen.size()));
     return context;
 }
 
-Result<PartContext> openContext(const std::filesystem::path& folder, const PartPlan& plan) {
-    VCP_TRY_ASSIGN(auto context, openDealt(folder, plan));
+Result<PartContext> openContext(const PartSetting& setting) {
+    VCP_TRY_ASSIGN(auto context, openCounted(setting));
     const Recorded& recorded = context.recorded;
-    VCP_TRY_ASSIGN(context.levels, planLevels(plan.options, recorded.measures, recorded.levelsLess));
+    VCP_TRY_ASSIGN(context.levels, planLevels(context.plan.options, recorded.measures, recorded.levelsLess));
     LevelPlan& levels = context.levels;
     levels.setPages(levels.frame, FinestPages(levels.gridOf(levels.levels() - 1), recorded.parted));
     levels.finest = PagePartition(recorded.partition);
-    context.threads = threadsOf(plan.options);
-    const uint64_t memory = plan.options.memoryBytes > 0 ? plan.options.memoryBytes : defaultMemoryBytes();
-    VCP_TRY_ASSIGN(context.memory, planMemory(memory, context.threads));
+    VCP_TRY_ASSIGN(context.memory, setting.divideMemory());
     VCP_TRY_ASSIGN(context.memory, planPages(context.memory, recorded.pages, levels.finest.bins()));
     levels.pageBytes = context.memory.pageBytes;
-    context.hasColour = colourUseOf(plan.options, recorded.measures).any();
+    context.hasColour = colourUseOf(context.plan.options, recorded.measures).any();
     return context;
 }
 
@@ -252,8 +278,7 @@ Result<void> runVertices(const PartContext& context, unsigned number, NewPart& m
     const LevelPlan& levels = context.levels;
     const size_t bins = levels.finest.bins();
     TempSpace& space = made.space(context.memory.tempBytes);
-    RecordBins<LatticeTriangle> dealt(*context.dealt.space, fmt::format("level{}", levels.levels()), bins, 0);
-    if (const uint64_t bytes = context.recorded.files.bins.at("current"); bytes > 0) VCP_TRY(dealt.raw().reopen(bytes));
+    VCP_TRY_ASSIGN(const auto dealt, GatheredBins<LatticeTriangle>::open(context, "deal", "for", "level", number));
     RecordBins<LatticeTriangle> triangles(space, "level", bins, context.memory.bufferBytes);
     RecordBins<VertexImage> vertices(space, "normals", bins, context.memory.bufferBytes / 4);
     PartNotes parts(space, context.memory.bufferBytes / 16);
@@ -269,11 +294,11 @@ Result<void> runVertices(const PartContext& context, unsigned number, NewPart& m
         VCP_TRY(step.run(bin, mesh));
     }
     json files;
-    VCP_TRY(record(triangles.raw(), "level", files));
-    VCP_TRY(record(vertices.raw(), "normals", files));
-    VCP_TRY(record(parts.raw(), "parts", files));
+    VCP_TRY(recordBins(triangles.raw(), "level", files));
+    VCP_TRY(recordBins(vertices.raw(), "normals", files));
+    VCP_TRY(recordBins(parts.raw(), "parts", files));
     return made.finish(
-        {{"bins", context.bins}, {"files", files}, {"for", partsWith(context, triangles.raw(), vertices.raw())}});
+        {{"bins", context.bins}, {"files", files}, {"for", partsWith(context, {&triangles.raw(), &vertices.raw()})}});
 }
 
 Result<void> runPages(const PartContext& context, unsigned number, NewPart& made) {
@@ -283,7 +308,8 @@ Result<void> runPages(const PartContext& context, unsigned number, NewPart& made
     std::deque<PageSpool> pages = makeSpools(space, levels.frame.levels, ""),
                           surfaces = makeSpools(space, levels.frame.levels, "surface"),
                           kept = makeSpools(space, levels.frame.levels, "kept");
-    VCP_TRY_ASSIGN(const auto textures, openTextures(context));
+    VCP_TRY_ASSIGN(const auto textures,
+                   GatheredBins<TexturedTriangle>::open(context, "deal", "textured", "textures", number));
     const size_t first = context.firstBins[number], end = context.firstBins[number + 1];
     for (size_t bin = first; bin < end; ++bin) {
         const auto report = [&](double part) {
@@ -293,8 +319,8 @@ Result<void> runPages(const PartContext& context, unsigned number, NewPart& made
         if (soup.empty()) continue;
         LatticeMesh mesh = meshOf(soup, context.hasColour);
         std::vector<LatticeTriangle>().swap(soup);
-        if (textures) {
-            VCP_TRY_ASSIGN(auto known, textures->load(bin));
+        if (!context.counted.fields.at("placed").empty()) {
+            VCP_TRY_ASSIGN(auto known, textures.load(bin));
             addTextures(mesh, std::move(known));
         }
         settleNormals(mesh);

@@ -1,6 +1,7 @@
 // What each stage of a build in parts does (build_parts.h).
 #pragma once
 
+#include <initializer_list>
 #include <memory>
 #include <string>
 #include <vector>
@@ -8,7 +9,6 @@
 #include <oneapi/tbb/task_arena.h>
 
 #include "builder/bin_passes.h"
-#include "builder/build_until_dealt.h"
 #include "builder/checkpoint.h"
 #include "builder/memory_plan.h"
 #include "builder/parts/part_folder.h"
@@ -17,22 +17,28 @@
 
 namespace vcp {
 
-/// What the parts after `deal` know of the build.
-struct PartContext {
+/// What all parts know.
+struct PartSetting {
     std::filesystem::path folder;
     PartPlan plan;
-    DonePart dealt;
+    const std::function<bool(double)>* progress = nullptr;
+
+    /// Divides the part's memory. Errors: planMemory's.
+    [[nodiscard]] Result<MemoryPlan> divideMemory() const;
+    [[nodiscard]] PartName part(const std::string& stage, unsigned number) const { return {folder, stage, number}; }
+};
+
+/// What the parts after `count` know of the build.
+struct PartContext : PartSetting {
+    DonePart counted;
     Recorded recorded;
     LevelPlan levels;
     MemoryPlan memory;
     bool hasColour = false;
     std::vector<size_t> firstBins;  ///< of each part, and the number of bins
     std::string bins;               ///< names the pages, the bins and whose they are; recorded by each part
-    unsigned threads = 1;
-    const std::function<bool(double)>* progress = nullptr;
 
-    [[nodiscard]] PartName part(const std::string& stage, unsigned number) const { return {folder, stage, number}; }
-    /// Opens a part of a later stage. Errors: openPart's; Usage (it was made when `deal` had chosen other bins).
+    /// Opens a part of a later stage. Errors: openPart's; Usage (it was made when `count` had chosen other bins).
     [[nodiscard]] Result<DonePart> open(const std::string& stage, unsigned number) const;
     /// Returns the first code of the deepest level that belongs to a part, or to those after all.
     [[nodiscard]] uint64_t firstCode(unsigned part) const;
@@ -40,10 +46,17 @@ struct PartContext {
     [[nodiscard]] LevelSettings settingsOf(int level, bool isFinest, TempSpace& space) const;
 };
 
-/// Opens what `deal` left, without what a part needs to run. Errors: those of openPart, InvalidInput (damaged).
-Result<PartContext> openDealt(const std::filesystem::path& folder, const PartPlan& plan);
-/// Opens what `deal` left. Errors: those of openDealt, Limit (too little memory).
-Result<PartContext> openContext(const std::filesystem::path& folder, const PartPlan& plan);
+/// Opens what `count` left, without what a part needs to run. Errors: those of openPart, InvalidInput (damaged).
+Result<PartContext> openCounted(const PartSetting& setting);
+/// Opens what `count` left. Errors: those of openCounted, Limit (too little memory).
+Result<PartContext> openContext(const PartSetting& setting);
+
+/// Makes bins durable and notes their length in `files`. Errors: Io.
+Result<void> recordBins(RawBins& bins, const std::string& name, nlohmann::json& files);
+/// Opens bins of a part that is done, as they were recorded. Errors: Io; InvalidInput (damaged).
+Result<void> reopenBins(const DonePart& part, const std::string& name, RawBins& bins);
+/// Returns the parts of the later stages whose bins have anything of these.
+std::vector<unsigned> partsWith(const PartContext& context, std::initializer_list<const RawBins*> bins);
 
 /// Uses the calling arena's threads, as do those below. Errors: runPart's.
 Result<void> runVertices(const PartContext& context, unsigned number, NewPart& made);

@@ -2,13 +2,15 @@
 """Measures what a build in parts costs: processor time against one build, and the longest part of each stage.
 
 usage: build_parts.py VCP MESH FOLDER [--parts 1,3,8] [--memory M] [--repeat N] [--simulate TRIANGLES:P,P]...
+MESH may be a folder of meshes, tiles of one scan: then reading is shared out as well.
 
 Everything runs with one thread, one process after the other, so that the processor time of a part is what it would
 take on a machine of its own; the least of all repetitions counts. The files must be the same, byte for byte.
 
 --simulate foretells a larger build from the stages that were measured. It assumes:
-  - deal, vertices and pages take the processor time a triangle that they took here; the parts of a stage differ as
-    the parts of the largest P differed here (drawn from these, the same draw each time);
+  - all stages but merge take the processor time a triangle that they took here; the parts of a stage differ as the
+    parts of the largest P differed here (drawn from these, the same draw each time), but for those of read and deal:
+    of many tiles each has about as much;
   - merge takes a time for each triangle and one for each boundary between parts on each level, of which there is one
     more for four times the triangles;
   - a part runs on a machine of its own with --processors, of which it makes use of three quarters;
@@ -23,8 +25,16 @@ import shutil
 
 PROCESSORS_USED = 0.75
 PROCESS_BYTES, ALL_BYTES = 1e9, 20e9  # a second
-# Bytes a triangle that a stage reads and writes: the input, the soup (written, and read twice), bins, pages.
-STAGE_BYTES = {"plan": 19, "deal": 19 + 3 * 40 + 67, "vertices": 67 + 72, "pages": 72 + 4, "merge": 4 + 4}
+# Bytes a triangle that a stage reads and writes: the input, the soup (written, read twice, read), bins, pages.
+STAGE_BYTES = {
+    "plan": 19,
+    "read": 19 + 18,
+    "count": 2 * 18,
+    "deal": 18 + 22,
+    "vertices": 22 + 29,
+    "pages": 29 + 2 * 22 + 4,
+    "merge": 4 + 4,
+}
 
 
 def run(*words):
@@ -50,7 +60,8 @@ def measured_parts(options, output, parts):
         shutil.rmtree(plan, ignore_errors=True)
         words = ["build-plan", options.mesh, "-o", output, "--parts", str(parts), *options.memory_words]
         seconds = {"plan": [run(options.vcp, *words)]}
-        for stage, count in (("deal", 1), ("vertices", parts), ("pages", parts), ("merge", 1)):
+        for stage in list(STAGE_BYTES)[1:]:
+            count = 1 if stage in ("count", "merge") else parts
             words = [options.vcp, "build-step", stage]
             rest = ["--plan", plan, "--threads", "1", "--progress", "none"]
             seconds[stage] = [run(*words, str(number), *rest) for number in range(count)]
@@ -67,9 +78,9 @@ def simulated(seconds, parts, fewest, triangles, wanted, processors, by):
     boundary = (seconds["merge"][0] - fewest["merge"][0]) / max(parts - 1, 1)
     levels = max(math.log(triangles, 4) - 6, 1)
     for stage in STAGE_BYTES:
-        count = by if stage in ("vertices", "pages") else 1
+        count = 1 if stage in ("plan", "count", "merge") else by
         mean = sum(seconds[stage]) / len(seconds[stage])
-        slowest = max(chosen.choice(seconds[stage]) / mean for _ in range(count))
+        slowest = max(chosen.choice(seconds[stage]) / mean for _ in range(count)) if stage in ("vertices", "pages") else 1
         work = sum(seconds[stage]) * wanted / triangles / count * slowest
         if stage == "merge":
             more = (levels + math.log(wanted / triangles, 4)) / levels

@@ -124,8 +124,8 @@ Command addBuildPlan(CLI::App& vcp) {
 Command addBuildStep(CLI::App& vcp) {
     auto command = std::make_shared<StepCommand>();
     CLI::App* app = vcp.add_subcommand("build-step", "Run one part of a planned build");
-    app->add_option("STAGE", command->stage, "deal, vertices, pages or merge")->type_name("")->required();
-    app->add_option("I", command->number, "Number of the part, from 0; deal and merge have part 0 only")
+    app->add_option("STAGE", command->stage, "read, count, deal, vertices, pages or merge")->type_name("")->required();
+    app->add_option("I", command->number, "Number of the part, from 0; count and merge have part 0 only")
         ->type_name("")
         ->required();
     const ScopedGroup scope(*app, help_group::kBuilding);

@@ -1,5 +1,5 @@
 // Builds in parts: the bytes of a whole build, whatever the order; parts that are lost, cut off, killed or foreign.
-#include "builder/parts/build_parts.h"
+#include "builder/parts/part_dealing.h"
 
 #include <algorithm>
 #include <fstream>
@@ -9,6 +9,7 @@
 
 #include <gtest/gtest.h>
 
+#include "builder/parts/build_parts.h"
 #include "tests/support/mesh_files.h"
 #include "tests/support/test_folder.h"
 #include "tests/support/test_meshes.h"
@@ -71,6 +72,11 @@ protected:
             ASSERT_TRUE(done.ok()) << stage << " " << i << ": " << done.error().line();
         }
     }
+    void dealAll(unsigned parts) const {
+        ASSERT_NO_FATAL_FAILURE(runAll("read", parts));
+        ASSERT_NO_FATAL_FAILURE(runAll("count", 1));
+        ASSERT_NO_FATAL_FAILURE(runAll("deal", parts));
+    }
     void planned(unsigned parts) const {
         const auto folder = planParts(options(), parts);
         ASSERT_TRUE(folder.ok()) << folder.error().line();
@@ -97,7 +103,7 @@ TEST_F(BuildParts, AreTheBytesOfTheWhole) {
         size_t files = 0;
         for (const auto& each : fs::recursive_directory_iterator(plan())) files += each.is_regular_file() ? 1 : 0;
         // The plan; of a part mark, journal and three files, or of each of at most 16 levels four.
-        EXPECT_LE(files, 1 + (1 + parts) * 5 + parts * (2 + 16 * 4));
+        EXPECT_LE(files, 1 + (1 + 3 * parts) * 5 + parts * (2 + 16 * 4));
         fs::remove_all(plan());
         fs::remove(output());
     }
@@ -125,16 +131,25 @@ TEST_F(BuildParts, TwoCopiesOfAPartAtOnce) {
 
 TEST_F(BuildParts, APartThatIsDoneIsNotRunAgain) {
     planned(2);
-    ASSERT_NO_FATAL_FAILURE(runAll("deal", 1));
-    const auto again = run("deal", 0);
-    ASSERT_TRUE(again.ok());
-    EXPECT_TRUE(again->wasDone);
+    ASSERT_NO_FATAL_FAILURE(dealAll(2));
+    for (const char* stage : {"read", "count", "deal"}) {
+        const auto again = run(stage, 0);
+        ASSERT_TRUE(again.ok());
+        EXPECT_TRUE(again->wasDone) << stage;
+    }
 }
 
 TEST_F(BuildParts, MissingPartsAreNamed) {
     planned(2);
+    expectRefused(run("vertices", 0), ErrorCode::Usage, "count 0");
+    ASSERT_TRUE(run("read", 0).ok());
+    expectRefused(run("count", 0), ErrorCode::Usage, "read 1");
+    ASSERT_TRUE(run("read", 1).ok());
+    expectRefused(run("deal", 1), ErrorCode::Usage, "count 0");
+    ASSERT_TRUE(run("count", 0).ok());
+    ASSERT_TRUE(run("deal", 1).ok());
     expectRefused(run("vertices", 0), ErrorCode::Usage, "deal 0");
-    ASSERT_NO_FATAL_FAILURE(runAll("deal", 1));
+    ASSERT_TRUE(run("deal", 0).ok());
     ASSERT_TRUE(run("vertices", 0).ok());
     expectRefused(run("pages", 0), ErrorCode::Usage, "vertices 1");
     ASSERT_TRUE(run("vertices", 1).ok());
@@ -157,8 +172,9 @@ struct Read {
 
 TEST_F(BuildParts, CutOffAndLostFilesNameTheirPart) {
     planned(3);
-    for (const Read& part : {Read{"deal", 0, "vertices"}, Read{"vertices", 1, "pages"}, Read{"pages", 1, "merge"}}) {
-        ASSERT_NO_FATAL_FAILURE(runAll(part.stage, part.stage == "deal" ? 1 : 3));
+    for (const Read& part : {Read{"read", 0, "count"}, Read{"count", 0, "deal"}, Read{"deal", 0, "vertices"},
+                             Read{"vertices", 1, "pages"}, Read{"pages", 1, "merge"}}) {
+        ASSERT_NO_FATAL_FAILURE(runAll(part.stage, part.stage == "count" ? 1 : 3));
         size_t tried = 0;
         for (const auto& each : fs::directory_iterator(plan() / part.folder())) {
             const fs::path file = each.path();
@@ -174,7 +190,10 @@ TEST_F(BuildParts, CutOffAndLostFilesNameTheirPart) {
             std::ofstream(file, std::ios::binary) << content;
             ++tried;
         }
-        EXPECT_GE(tried, part.stage == "deal" ? 2u : 3u) << part.stage;
+        EXPECT_GE(tried, part.stage == "count"                               ? 1u
+                         : part.stage == "vertices" || part.stage == "pages" ? 3u
+                                                                             : 2u)
+            << part.stage;
         fs::remove_all(plan() / part.folder());
         expectRefused(run(part.by, 0), ErrorCode::Usage, part.name());
         ASSERT_TRUE(run(part.stage, part.number).ok());
@@ -185,8 +204,9 @@ TEST_F(BuildParts, CutOffAndLostFilesNameTheirPart) {
 
 TEST_F(BuildParts, WrongBytesNameTheirPart) {
     planned(2);
-    for (const Read& part : {Read{"deal", 0, "vertices"}, Read{"vertices", 0, "pages"}, Read{"pages", 1, "merge"}}) {
-        ASSERT_NO_FATAL_FAILURE(runAll(part.stage, part.stage == "deal" ? 1 : 2));
+    for (const Read& part : {Read{"read", 0, "count"}, Read{"count", 0, "deal"}, Read{"deal", 0, "vertices"},
+                             Read{"vertices", 0, "pages"}, Read{"pages", 1, "merge"}}) {
+        ASSERT_NO_FATAL_FAILURE(runAll(part.stage, part.stage == "count" ? 1 : 2));
         for (const auto& each : fs::directory_iterator(plan() / part.folder())) {
             const std::string content = bytesOf(each.path());
             if (content.empty()) continue;
@@ -195,7 +215,7 @@ TEST_F(BuildParts, WrongBytesNameTheirPart) {
             std::ofstream(each.path(), std::ios::binary) << wrong;
             // One of the readers meets the byte.
             auto refused = run(part.by, 0);
-            if (refused && part.by != "merge") refused = run(part.by, 1);
+            if (refused && part.by != "merge" && part.by != "count") refused = run(part.by, 1);
             expectRefused(refused, ErrorCode::InvalidInput, part.name());
             std::ofstream(each.path(), std::ios::binary) << content;
             for (const char* number : {"-0", "-1"}) fs::remove_all(plan() / (part.by + number));
@@ -207,12 +227,14 @@ TEST_F(BuildParts, WrongBytesNameTheirPart) {
 
 TEST_F(BuildParts, PartsOfOtherBinsAreRefused) {
     planned(2);
-    ASSERT_NO_FATAL_FAILURE(runAll("deal", 1));
+    ASSERT_NO_FATAL_FAILURE(dealAll(2));
     ASSERT_NO_FATAL_FAILURE(runAll("vertices", 2));
     ASSERT_NO_FATAL_FAILURE(runAll("pages", 2));
-    // The same deal again, as after a loss: what was made from it stays good.
-    fs::remove_all(plan() / "deal-0");
-    ASSERT_TRUE(run("deal", 0).ok());
+    // The same again, as after a loss: what was made from it stays good.
+    for (const char* stage : {"read", "count", "deal"}) {
+        fs::remove_all(plan() / (std::string(stage) + "-0"));
+        ASSERT_TRUE(run(stage, 0).ok());
+    }
     const auto again = run("pages", 1);
     ASSERT_TRUE(again.ok()) << again.error().line();
     EXPECT_TRUE(again->wasDone);
@@ -223,16 +245,19 @@ TEST_F(BuildParts, PartsOfOtherBinsAreRefused) {
     fs::create_directory(coarser.temp);
     const auto other = planParts(coarser, 2);
     ASSERT_TRUE(other.ok()) << other.error().line();
-    ASSERT_TRUE(runPart({.folder = *other, .stage = "deal", .number = 0, .threads = 1}).ok());
-    fs::rename(plan() / "deal-0", folder_ / "deal-0");
-    fs::rename(*other / "deal-0", plan() / "deal-0");
-    expectRefused(run("merge", 0), ErrorCode::Usage, "pages 0");
+    for (const unsigned reader : {0u, 1u})
+        ASSERT_TRUE(runPart({.folder = *other, .stage = "read", .number = reader, .threads = 1}).ok());
+    ASSERT_TRUE(runPart({.folder = *other, .stage = "count", .number = 0, .threads = 1}).ok());
+    fs::rename(plan() / "count-0", folder_ / "count-0");
+    fs::rename(*other / "count-0", plan() / "count-0");
+    expectRefused(run("merge", 0), ErrorCode::Usage, "deal 0");
     expectRefused(run("pages", 1), ErrorCode::Usage, "pages 1");
     fs::remove_all(plan() / "pages-0");
     expectRefused(run("pages", 0), ErrorCode::Usage, "vertices 0");
     expectRefused(run("vertices", 1), ErrorCode::Usage, "vertices 1");
-    fs::remove_all(plan() / "deal-0");
-    fs::rename(folder_ / "deal-0", plan() / "deal-0");
+    expectRefused(run("deal", 1), ErrorCode::Usage, "deal 1");
+    fs::remove_all(plan() / "count-0");
+    fs::rename(folder_ / "count-0", plan() / "count-0");
     for (const PartStage& stage : stagesOf(2)) ASSERT_NO_FATAL_FAILURE(runAll(stage.name, stage.parts));
     EXPECT_EQ(bytesOf(output()), whole_);
 }
@@ -243,9 +268,9 @@ TEST_F(BuildParts, AnotherProgramIsRefused) {
     const size_t at = text.find("\"program\": \"") + 12;
     text[at] = text[at] == '9' ? '8' : '9';
     std::ofstream(plan() / "plan.json", std::ios::binary) << text;
-    expectRefused(run("deal", 0), ErrorCode::Usage, "another build of vcp");
+    expectRefused(run("read", 0), ErrorCode::Usage, "another build of vcp");
     std::ofstream(plan() / "plan.json", std::ios::binary) << text.substr(0, text.size() / 2);
-    expectRefused(run("deal", 0), ErrorCode::InvalidInput, "not a whole plan");
+    expectRefused(run("read", 0), ErrorCode::InvalidInput, "not a whole plan");
 }
 
 TEST_F(BuildParts, ChangedInputsAreRefusedAndTouchedOnesAreNot) {
@@ -255,9 +280,48 @@ TEST_F(BuildParts, ChangedInputsAreRefusedAndTouchedOnesAreNot) {
     content[content.size() / 2] ^= 1;
     const std::string before = bytesOf(input());
     std::ofstream(input(), std::ios::binary) << content;
-    expectRefused(run("deal", 0), ErrorCode::Usage, "was changed since");
+    expectRefused(run("read", 0), ErrorCode::Usage, "was changed since");
     std::ofstream(input(), std::ios::binary) << before;
-    EXPECT_TRUE(run("deal", 0).ok());
+    EXPECT_TRUE(run("read", 0).ok());
+}
+
+TEST_F(BuildParts, InputsAreSharedOutByTheirBytes) {
+    const auto is = [](const InputShare& share, unsigned reader, unsigned first, unsigned last) {
+        EXPECT_EQ(share.reader, reader);
+        EXPECT_EQ(share.firstPart, first);
+        EXPECT_EQ(share.lastPart, last);
+    };
+    is(inputShares({12345}, 4)[0], 0, 0, 3);
+    const auto equal = inputShares({100, 100, 100, 100}, 2);
+    for (unsigned i = 0; i < 4; ++i) is(equal[i], i / 2, i / 2, i / 2);
+    const auto mixed = inputShares({0, 50, 1000, 50}, 3);
+    is(mixed[0], 0, 0, 0);
+    is(mixed[1], 0, 0, 0);
+    is(mixed[2], 0, 0, 2);
+    is(mixed[3], 2, 2, 2);
+}
+
+TEST_F(BuildParts, OfTilesEachPartDealsItsOwn) {
+    const IndexedMesh mesh = mixedMesh();
+    BuildOptions o = options();
+    o.inputs.clear();
+    constexpr size_t kTiles = 6;
+    for (size_t tile = 0; tile < kTiles; ++tile) {
+        IndexedMesh part;
+        part.positions = mesh.positions;
+        for (size_t i = tile; i < mesh.triangles.size(); i += kTiles) part.triangles.push_back(mesh.triangles[i]);
+        o.inputs.push_back(folder_ / ("tile" + std::to_string(tile) + ".ply"));
+        test::writePly(part, o.inputs.back(), {});
+    }
+    const auto built = buildOctree(o);
+    ASSERT_TRUE(built.ok()) << built.error().line();
+    const std::string whole = bytesOf(output());
+    fs::remove(output());
+    ASSERT_TRUE(planParts(o, 3).ok());
+    for (const PartStage& stage : stagesOf(3)) {
+        ASSERT_NO_FATAL_FAILURE(runAll(stage.name, stage.parts, 3));
+    }
+    EXPECT_EQ(bytesOf(output()), whole);
 }
 
 TEST_F(BuildParts, WhatCannotBePlanned) {

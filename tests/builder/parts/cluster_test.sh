@@ -20,8 +20,8 @@ same() { cmp whole.vcp "$1" || fail "$2: other bytes than vcp build writes"; }
 "$vcp" build-plan scan.ply -o killed.vcp --parts 3 --json >planned
 grep '"parts": *3' planned >said || fail "$(cat planned)"
 RANDOM=5 kills=0
-for stage in deal vertices pages merge; do
-    case $stage in vertices | pages) parts="2 0 1" ;; *) parts=0 ;; esac
+for stage in read count deal vertices pages merge; do
+    case $stage in count | merge) parts=0 ;; *) parts="2 0 1" ;; esac
     for part in $parts; do
         for _ in 1 2 3 4; do
             "$vcp" build-step "$stage" "$part" --plan killed.vcp.parts --progress none >said 2>&1 &
@@ -48,7 +48,7 @@ refused() { # WANTED COMMAND...
 }
 refused "there already" "$vcp" build-plan scan.ply -o killed.vcp --parts 3
 refused "cannot be built in parts" "$vcp" build-plan - -o other.vcp --parts 3
-refused "plan.json" "$vcp" build-step deal 0 --plan .
+refused "plan.json" "$vcp" build-step read 0 --plan .
 refused "parts 0 to 2" "$vcp" build-step pages 3 --plan killed.vcp.parts
 rm -r killed.vcp.parts/vertices-1
 rm -r killed.vcp.parts/pages-*
@@ -66,7 +66,7 @@ fi
 "$vcp" build small.ply -o small_whole.vcp --progress none >said
 "$vcp" build-plan small.ply -o full.vcp --parts 2 >said
 calls=0
-for step in "deal 0" "vertices 1" "vertices 0" "pages 1" "pages 0" "merge 0"; do
+for step in "read 1" "read 0" "count 0" "deal 1" "deal 0" "vertices 1" "vertices 0" "pages 1" "pages 0" "merge 0"; do
     for ((n = 1; ; ++n)); do
         rm -f failed
         before=$(ls full.vcp.parts) status=0
@@ -111,4 +111,4 @@ chmod +x bin/sbatch
 "$vcp" build-plan scan.ply -o "a folder/slurm.vcp" --parts 2 >said
 PATH=$work/bin:$PATH VCP=$vcp "$scripts/vcp-slurm.sh" "a folder/slurm.vcp.parts" --mem=1G >said || fail "$(cat said sbatch_said)"
 same "a folder/slurm.vcp" "vcp-slurm.sh"
-[ "$(wc -l <said)" = 4 ] || fail "$(cat said)"
+[ "$(wc -l <said)" = 6 ] || fail "$(cat said)"

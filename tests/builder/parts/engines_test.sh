@@ -177,7 +177,7 @@ testSlurm() {
     scancel "$(sed -n 's/^vertices: job \([0-9]*\),.*/\1/p' submitted)_1"
     eventually 60 noJobs
     # Slurm lets go on what it cancels, to end by itself: so vertices 1 may be done.
-    has deal-0 vertices-0 vertices-2 - pages-0 pages-1 pages-2
+    has count-0 deal-0 deal-1 deal-2 vertices-0 vertices-2 - pages-0 pages-1 pages-2
     says CANCELLED "$plan/logs/vertices-1.txt"
     submits
     eventually 60 noJobs
@@ -203,7 +203,7 @@ testSnakemake() {
     plans snake
     snakes --cores 2 --keep-going &
     endsStopped killsStopped
-    has deal-0 vertices-0 vertices-2 - vertices-1 pages-0 pages-1
+    has count-0 deal-0 deal-1 deal-2 vertices-0 vertices-2 - vertices-1 pages-0 pages-1
     if snakes --cores 2 --keep-going; then fail "pages 0 was killed, but Snakemake has succeeded"; fi
     has vertices-1 pages-1 pages-2 - pages-0
     snakes --cores 2 || fail "$(cat said)"
@@ -216,7 +216,7 @@ testSnakemakeOnSlurm() {
     plans snake
     snakes --jobs 8 --keep-going --cluster-sync "sbatch --wait --output=$work/job-%j.txt --cpus-per-task={threads}" &
     endsStopped cancelsStopped
-    has deal-0 vertices-0 vertices-2 - pages-0 pages-1
+    has count-0 deal-0 deal-1 deal-2 vertices-0 vertices-2 - pages-0 pages-1
     if snakes --jobs 8 --keep-going --cluster "sbatch --output=$work/job-%j.txt --cpus-per-task={threads}"; then
         fail "pages 0 was killed, but Snakemake has succeeded"
     fi
@@ -236,13 +236,15 @@ testMpi() {
     }
     HOME=$work mpirun "${root[@]}" --oversubscribe -n 2 true >said 2>&1 || { cat said; echo "skipped: no MPI here"; exit 77; }
     plans mpi
-    runs deal 1 || fail "$(cat said)"
+    runs read 3 || fail "$(cat said)"
+    runs count 1 || fail "$(cat said)"
+    runs deal 3 || fail "$(cat said)"
     runs vertices 3 &
     local mpi=$!
     eventually 60 test -s bin/stopped/part
     killsStopped
     if wait $mpi; then fail "mpirun has not failed: $(cat said)"; fi
-    has deal-0 - vertices-1
+    has deal-2 - vertices-1
     runs vertices 3 || fail "$(cat said)"
     if runs pages 3; then fail "pages 0 was killed, but mpirun has succeeded"; fi
     has - pages-0
