@@ -184,6 +184,13 @@ Json toJson(const TiledPictureStats& total, size_t pictures, uint32_t samples, c
             {"bytes_read", total.update.bytesRead}};
 }
 
+/// `hits`: pixels where something is seen, of one picture or of all.
+void warnOfEmptyPicture(uint64_t hits, const FrameRequest& request) {
+    if (hits > 0) return;
+    warnOnTerminal(fmt::format("nothing is seen: the camera looks elsewhere{}",
+                               request.sections.empty() ? "" : ", or the section cuts all of it away"));
+}
+
 }  // namespace
 
 Result<void> checkValidation(const PictureRenderer& renderer) {
@@ -217,6 +224,7 @@ Result<Json> drawOne(PictureRenderer& renderer, const FrameRequest& request, con
     VCP_TRY(checkValidation(renderer));
     VCP_TRY(writePlanes(renderer, request, command, rules));
     VCP_TRY(writePng(sideBySide(panels), command.output, rules));
+    warnOfEmptyPicture(first->stats.hitPixels, request);
     return report(command, *first, panels, renderer.device(), request, camera);
 }
 
@@ -244,6 +252,7 @@ Result<Json> makeTiled(PictureRenderer& renderer, const FrameRequest& request, c
     }
     display.finish();
     const TiledPictureStats& total = sequence.stats();
+    warnOfEmptyPicture(total.hitPixels, request);
     if (command.report.json)
         return toJson(total, course.cameras.size(), samplesOf(request, command.samples), renderer.device(), request);
     const std::string first = command.fileOf(command.output, 1).string();
