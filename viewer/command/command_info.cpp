@@ -12,7 +12,7 @@ namespace vcp {
 namespace {
 
 struct InfoCommand {
-    std::string file;
+    std::vector<std::string> files;
     SourceAccess source;
     ReportOptions report;
 };
@@ -184,24 +184,45 @@ std::string summary(const std::string& file, const Dataset& dataset, uint64_t sh
     return text;
 }
 
-Result<int> run(const InfoCommand& command) {
-    const InterruptScope catching;
-    VCP_TRY_ASSIGN(const auto reader, openReader(command.file, command.source));
+/// Prints what there is to say of a file, or returns it for --json.
+Result<Json> describe(const std::string& file, const InfoCommand& command) {
+    VCP_TRY_ASSIGN(const auto reader, openReader(file, command.source));
     VCP_TRY_ASSIGN(const auto dataset, readDataset(*reader));
     const uint64_t shards = shardsOf(*reader);
-    if (command.report.json)
-        VCP_TRY(printJson(toJson(reader->name(), dataset, shards)));
-    else
-        VCP_TRY(printLine(summary(reader->name(), dataset, shards)));
-    return 0;
+    if (command.report.json) return toJson(reader->name(), dataset, shards);
+    VCP_TRY(printLine(summary(reader->name(), dataset, shards)));
+    return Json();
+}
+
+Result<int> run(const InfoCommand& command) {
+    const InterruptScope catching;
+    const bool isOne = command.files.size() == 1;
+    Json described = Json::array();
+    size_t failed = 0;
+    for (const std::string& file : command.files) {
+        if (!command.report.json && &file != &command.files.front()) VCP_TRY(printLine(""));
+        auto json = describe(file, command);
+        if (!json) {
+            // A file that cannot be read does not keep the others from being described.
+            if (isOne || json.error().code == ErrorCode::Cancelled) return json.error();
+            warnOnTerminal(json.error().line());
+            ++failed;
+            json = Json{{"error", json.error().line()}};
+        }
+        described.push_back(*std::move(json));
+    }
+    if (command.report.json) VCP_TRY(printJson(isOne ? described.front() : Json{{"files", described}}));
+    if (failed == 0) return 0;
+    return Error{.code = ErrorCode::InvalidInput,
+                 .message = fmt::format("{} of {} files could not be read", failed, command.files.size())};
 }
 
 }  // namespace
 
 Command addInfo(CLI::App& vcp) {
     auto command = std::make_shared<InfoCommand>();
-    CLI::App* app = vcp.add_subcommand("info", "Say what is in a .vcp file");
-    app->add_option("FILE", command->file, "A .vcp file, a folder of shards, or the http(s) address of either")
+    CLI::App* app = vcp.add_subcommand("info", "Say what is in .vcp files");
+    app->add_option("FILE", command->files, ".vcp files, folders of shards, or the http(s) addresses of either")
         ->type_name("")
         ->required();
     addSourceSettings(*app, command->source);

@@ -266,6 +266,23 @@ TEST_F(CommandLine, MeshIsNoDatasetForInfoAndVerify) {
     expectFailure(run({"verify", ball().string()}), 1, ball().string());
 }
 
+TEST_F(CommandLine, InfoOfSeveralFiles) {
+    const std::string one = dataset().string(), other = (*folder_ / "other.vcp").string(),
+                      broken = (*folder_ / "no_dataset.vcp").string();
+    fs::copy_file(one, other, fs::copy_options::overwrite_existing);
+    write(broken, "no dataset");
+    const Ran both = run({"info", one, other});
+    EXPECT_EQ(both.status, 0) << both.err;
+    EXPECT_LT(both.out.find(one + ": "), both.out.find("\n\n" + other + ": "));
+    const Ran ran = run({"info", one, broken, other, "--json"});
+    EXPECT_EQ(ran.status, 1);
+    EXPECT_NE(ran.err.find("1 of 3 files could not be read"), std::string::npos) << ran.err;
+    const Json files = Json::parse(ran.out)["files"];
+    ASSERT_EQ(files.size(), 3u);
+    EXPECT_EQ(files[0]["triangles"], files[2]["triangles"]);
+    EXPECT_NE(files[1]["error"].get<std::string>().find("no_dataset.vcp"), std::string::npos);
+}
+
 TEST_F(CommandLine, BuildReportsWhatProgramsRelyOn) {
     const fs::path file = *folder_ / "reported.vcp";
     const Ran ran = run({"build", ball().string(), "-o", file.string(), "--json", "--progress", "json"});
@@ -650,6 +667,21 @@ TEST_F(CommandLine, ADryRunIsNearWhatTheBuildThenTakes) {
         near("file_bytes", "file_bytes", 0.8, 1.25);
         EXPECT_GT(told["seconds"], 0);
         EXPECT_GE(told["memory_cap_bytes"], told["memory_bytes"]);
+    }
+}
+
+TEST_F(CommandLine, APictureInWhichNothingIsSeenIsSaidSo) {
+    const std::vector<std::string> words{
+        "render", dataset().string(), "-o", (*folder_ / "empty.png").string(), "--size", "64x48", "--device", "host"};
+    const Ran seen = run(words);
+    EXPECT_EQ(seen.err.find("nothing is seen"), std::string::npos) << seen.err;
+    for (const std::vector<std::string>& more : {std::vector<std::string>{}, {"--tile", "32"}}) {
+        std::vector<std::string> cut = words;
+        cut.insert(cut.end(), {"--section", "x>1000000"});
+        cut.insert(cut.end(), more.begin(), more.end());
+        const Ran empty = run(cut);
+        EXPECT_EQ(empty.status, 0) << empty.err;
+        EXPECT_NE(empty.err.find("nothing is seen"), std::string::npos) << empty.err;
     }
 }
 
