@@ -262,9 +262,12 @@ private:
         releaseMemory();
         // Images are not kept, so a soup that needs them is dealt before its checkpoint. What was read is not lost
         // where there is too little room for the rest.
-        auto checked = checkSpace();
-        if (files_.soup->materials.empty()) VCP_TRY(checkpoint("read", 0, !checked));
-        return checked;
+        const auto checked = checkSpace();
+        const auto kept = files_.soup->materials.empty() ? checkpoint("read", 0, !checked) : Result<void>();
+        if (checked) return kept;
+        Error error = checked.error();
+        if (kept && journal_.active()) error.code = ErrorCode::Io;
+        return error;
     }
 
     /// Checks the free space now: a disk that is too small would be noticed only after hours.

@@ -7,6 +7,8 @@
 #include <fmt/format.h>
 #include <xxhash.h>
 
+#include "builder/spill/journal.h"
+
 namespace vcp {
 
 namespace {
@@ -227,8 +229,7 @@ json jsonOf(const SoupMeasures& m) {
 json jsonOf(const std::vector<SideFile>& files) {
     json pairs = json::array();
     for (const SideFile& each : files) {
-        const std::string& path = each.path.native();
-        pairs.push_back({json(std::vector<uint8_t>(path.begin(), path.end())), each.stamp});
+        pairs.push_back({bytesJson(each.path.native()), each.stamp});
     }
     return pairs;
 }

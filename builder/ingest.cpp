@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 #include <oneapi/tbb/task_group.h>
+#include <xxhash.h>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
@@ -118,13 +119,21 @@ private:
         coding_.run([this, bin = bin_, floats = std::move(floats_), doubles = std::move(doubles_)] {
             auto done = soup_.doubles.append(bin, doubles);
             if (done) done = soup_.floats.append(bin, floats);
+            const bool areShared = soup_.floats.raw().bins() > 1;
+            const uint64_t content = areShared ? contentOf(bin, floats) + contentOf(bin, doubles) : 0;
             const std::scoped_lock lock(mutex_);
+            tally_.content += content;
             if (coded_) coded_ = std::move(done);
         });
         bin_ = bin_ < soup_.lastBin ? bin_ + 1 : soup_.firstBin;
         floats_.clear();
         doubles_.clear();
         floats_.reserve(kBatch);
+    }
+
+    template <class Real>
+    static uint64_t contentOf(size_t bin, const std::vector<WorldTriangle<Real>>& triangles) {
+        return XXH3_64bits_withSeed(triangles.data(), triangles.size() * sizeof(WorldTriangle<Real>), bin);
     }
 
     Result<void> wait() {
@@ -168,6 +177,7 @@ void SoupTally::add(const SoupTally& other) {
     area.add(other.area);
     length.add(other.length);
     isTooLarge |= other.isTooLarge;
+    content += other.content;
 }
 
 Result<SoupTally> readInputs(const BuildOptions& options, TempSpace& space, uint64_t vertexBytes, Soup& soup,

@@ -56,6 +56,8 @@ struct SoupTally {
     SoupMeasures counted;  ///< without area and length
     ExactSum area, length;
     bool isTooLarge = false;  ///< some lengths or areas are no finite doubles
+    /// Of a soup of several bins: tells which triangle is in which bin. Which threads worked on them does not count.
+    uint64_t content = 0;
 
     SoupTally();
     void add(const SoupTally& other);

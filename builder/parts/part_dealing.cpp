@@ -1,6 +1,7 @@
 #include "builder/parts/part_dealing.h"
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <memory>
 #include <optional>
@@ -8,10 +9,12 @@
 #include <utility>
 
 #include "builder/deal.h"
+#include "builder/estimate.h"
 #include "builder/image_store.h"
 #include "builder/lattice_soup.h"
 #include "builder/page_plan.h"
 #include "builder/parts/part_materials.h"
+#include "builder/spill/journal.h"
 #include "builder/texture/material_colours.h"
 
 namespace vcp {
@@ -27,7 +30,8 @@ json jsonOf(const SoupTally& tally) {
     return {{"measures", vcp::jsonOf(m)},
             {"area", tally.area.words()},
             {"length", tally.length.words()},
-            {"too large", tally.isTooLarge}};
+            {"too large", tally.isTooLarge},
+            {"content", tally.content}};
 }
 
 glm::dvec3 vectorFrom(const json& j) { return {j.at(0).get<double>(), j.at(1).get<double>(), j.at(2).get<double>()}; }
@@ -51,26 +55,19 @@ SoupTally tallyFrom(const json& j) {
     tally.area.add(j.at("area").get<std::vector<uint64_t>>());
     tally.length.add(j.at("length").get<std::vector<uint64_t>>());
     tally.isTooLarge = j.at("too large").get<bool>();
+    tally.content = j.at("content").get<uint64_t>();
     return tally;
-}
-
-std::vector<SideFile> sideFilesFrom(const json& pairs) {
-    std::vector<SideFile> files;
-    for (const json& pair : pairs) {
-        const auto path = pair.at(0).get<std::vector<uint8_t>>();
-        files.push_back({std::string(path.begin(), path.end()), pair.at(1).get<std::string>()});
-    }
-    return files;
 }
 
 std::vector<InputShare> sharesOf(const PartPlan& plan) {
     std::vector<uint64_t> bytes;
-    for (const PlannedInput& each : plan.inputs) {
-        std::error_code missing;
-        const auto size = std::filesystem::file_size(each.path, missing);
-        bytes.push_back(missing ? 0 : uint64_t(size));
-    }
+    for (const PlannedInput& each : plan.inputs) bytes.push_back(each.bytes);
     return inputShares(bytes, plan.parts);
+}
+
+json jsonOf(const PlannedInput& file) { return {bytesJson(file.path.native()), file.stamp, file.hash, file.bytes}; }
+PlannedInput plannedFrom(const json& j) {
+    return {textFromBytes(j.at(0)), j.at(1).get<std::string>(), j.at(2).get<uint64_t>(), j.at(3).get<uint64_t>()};
 }
 
 /// What the parts of `read` left: all of it, or what goes to one part of `deal`.
@@ -80,42 +77,63 @@ public:
         ReadParts all;
         for (unsigned k = 0; k < setting.plan.parts; ++k) {
             VCP_TRY_ASSIGN(auto part, openPart({setting.folder, "read", k}));
-            all.parts_.push_back(std::move(part));
-            VCP_TRY(all.add(all.parts_.back(), setting.plan.parts, dealt));
+            all.spaces_.push_back(std::move(part.space));
+            VCP_TRY(all.add(part.fields, *all.spaces_.back(), setting.plan.parts, dealt));
         }
         return all;
     }
 
     SoupTally tally;
+    std::vector<uint64_t> contents;  ///< of each part
     std::vector<Material> materials;
     std::vector<std::string> warnings;
     std::vector<SideFile> sideFiles;
     std::vector<SoupShare> soups;
 
 private:
-    Result<void> add(const DonePart& part, unsigned parts, std::optional<unsigned> dealt) {
+    Result<void> add(const json& fields, TempSpace& space, unsigned parts, std::optional<unsigned> dealt) {
+        const auto wanted = fields.at("for").get<std::vector<unsigned>>();
+        const bool isWanted = dealt ? std::ranges::find(wanted, *dealt) != wanted.end() : !wanted.empty();
         const auto before = uint32_t(materials.size());
-        VCP_TRY_ASSIGN(const auto more, recordedMaterials(part.fields.at("materials"), *part.space));
+        VCP_TRY_ASSIGN(const auto more, recordedMaterials(fields.at("materials"), space, isWanted));
         materials.insert(materials.end(), more.begin(), more.end());
-        tally.add(tallyFrom(part.fields.at("tally")));
-        const auto said = part.fields.at("warnings").get<std::vector<std::string>>();
+        const SoupTally own = tallyFrom(fields.at("tally"));
+        tally.add(own);
+        contents.push_back(own.content);
+        const auto said = fields.at("warnings").get<std::vector<std::string>>();
         warnings.insert(warnings.end(), said.begin(), said.end());
-        for (SideFile& each : sideFilesFrom(part.fields.at("side files")))
-            if (named_.insert(each.path).second) sideFiles.push_back(std::move(each));
-        const auto wanted = part.fields.at("for").get<std::vector<unsigned>>();
-        if (dealt ? std::find(wanted.begin(), wanted.end(), *dealt) == wanted.end() : wanted.empty()) return {};
-        auto soup = std::make_unique<Soup>(*part.space, 0, parts);
-        VCP_TRY(reopenBins(part, "floats", soup->floats.raw()));
-        VCP_TRY(reopenBins(part, "doubles", soup->doubles.raw()));
+        for (const json& each : fields.at("side files")) {
+            const PlannedInput file = plannedFrom(each);
+            if (!named_.insert(file.path).second) continue;
+            // Images are read anew, maybe hours later and elsewhere.
+            VCP_TRY(checkInput(file));
+            sideFiles.push_back({file.path, file.stamp});
+        }
+        if (!isWanted) return {};
+        auto soup = std::make_unique<Soup>(space, 0, parts);
+        VCP_TRY(reopenBins(fields, "floats", soup->floats.raw()));
+        VCP_TRY(reopenBins(fields, "doubles", soup->doubles.raw()));
         soups.push_back({.soup = *soup, .bin = dealt, .materialsBefore = before});
         soups_.push_back(std::move(soup));
         return {};
     }
 
-    std::vector<DonePart> parts_;
+    std::vector<std::unique_ptr<TempSpace>> spaces_;
     std::vector<std::unique_ptr<Soup>> soups_;
     std::set<std::filesystem::path> named_;
 };
+
+/// Checks the free space for the stages to come: of a part that finds no room hours have gone by.
+Result<void> checkSpace(const PartSetting& setting, const SoupMeasures& measures, uint64_t imageBytes) {
+    const std::array<SpaceNeed, 2> needs{
+        {{setting.folder, expectedTempBytes(measures.triangles, 0, imageBytes, 0), "folder for the plan"},
+         {setting.plan.options.output, expectedFileBytes(measures.triangles) + imageBytes, "folder"}}};
+    auto checked = checkFreeSpace(needs);
+    if (checked) return {};
+    Error error = checked.error();
+    error.file = setting.plan.options.output.string();
+    return error;
+}
 
 /// Codes the images that the file keeps; records where they are, and what the file has of each material.
 Result<void> keepImages(const PartSetting& setting, const ReadParts& read, const MemoryPlan& memory, NewPart& made,
@@ -173,7 +191,8 @@ Result<void> runRead(const PartSetting& setting, unsigned number, NewPart& made)
         tally.add(more);
         ++done;
     }
-    json fields{{"tally", jsonOf(tally)}, {"warnings", warnings}, {"side files", vcp::jsonOf(sideFiles)}};
+    json fields{{"tally", jsonOf(tally)}, {"warnings", warnings}, {"side files", json::array()}};
+    for (const SideFile& each : sideFiles) fields["side files"].push_back(jsonOf(describeSideFile(each)));
     VCP_TRY_ASSIGN(fields["materials"], recordMaterials(soup.materials, space));
     VCP_TRY(recordBins(soup.floats.raw(), "floats", fields["files"]));
     VCP_TRY(recordBins(soup.doubles.raw(), "doubles", fields["files"]));
@@ -198,6 +217,7 @@ Result<void> runCount(const PartSetting& setting, NewPart& made) {
                                 .parts = setting.plan.parts,
                                 .progress = [&](double part) { return (*setting.progress)(part / 2); }}));
     VCP_TRY_ASSIGN(memory, planPages(memory, plan.pages, plan.levels.finest.bins()));
+    VCP_TRY(checkSpace(setting, measures, withImages ? expectedImageBytes(read.materials) : 0));
     made.space(memory.tempBytes);
     std::vector<std::string> warnings = read.warnings;
     if (auto wide = wideCellWarning(options, measures)) warnings.push_back(std::move(*wide));
@@ -217,7 +237,8 @@ Result<void> runCount(const PartSetting& setting, NewPart& made) {
                 {"pass", 0},
                 {"bin", 0u},
                 {"first bins", plan.firstBins},
-                {"placed", json::array()}};
+                {"placed", json::array()},
+                {"read", read.contents}};
     if (withImages) VCP_TRY(keepImages(setting, read, memory, made, warnings, fields));
     fields["warnings"] = warnings;
     return made.finish(fields);
@@ -229,6 +250,14 @@ Result<void> runDeal(const PartContext& context, unsigned number, NewPart& made)
     const MemoryPlan& memory = context.memory;
     const SoupMeasures& measures = context.recorded.measures;
     VCP_TRY_ASSIGN(const auto read, ReadParts::open(context, number));
+    const auto counted = context.counted.fields.at("read").get<std::vector<uint64_t>>();
+    for (unsigned k = 0; k < context.plan.parts; ++k)
+        if (read.contents[k] != counted.at(k))
+            return Error{.code = ErrorCode::Usage,
+                         .message =
+                             "was run again with another memory since \"count 0\": delete count-0, and run the "
+                             "step \"count 0\" of this plan again",
+                         .file = context.part("read", k).folder().string()};
     TempSpace& space = made.space(memory.tempBytes);
     const size_t bins = levels.finest.bins();
     RecordBins<LatticeTriangle> triangles(space, "level", bins, memory.bufferBytes);

@@ -33,16 +33,15 @@ public:
     NewPart(const NewPart&) = delete;
     NewPart& operator=(const NewPart&) = delete;
 
-    [[nodiscard]] const std::filesystem::path& folder() const { return folder_; }
     /// The temporary files of the part; made with the first call, which says what they may hold in memory.
     TempSpace& space(uint64_t memoryBytes);
     /// Records `fields`, durably, and gives the folder its name. All files must be durable. Where another process has
     /// finished the same part meanwhile, this one goes. Errors: Io.
     Result<void> finish(const nlohmann::json& fields);
-    /// Gives the folder its name, once its journal is written.
-    Result<void> rename();
 
 private:
+    Result<void> rename();
+
     PartName part_;
     std::filesystem::path folder_;
     std::unique_ptr<TempSpace> space_;

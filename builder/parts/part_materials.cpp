@@ -1,9 +1,13 @@
 #include "builder/parts/part_materials.h"
 
 #include <algorithm>
+#include <bit>
+#include <initializer_list>
 #include <map>
 
 #include <xxhash.h>
+
+#include "builder/spill/journal.h"
 
 namespace vcp {
 
@@ -12,19 +16,16 @@ namespace {
 using nlohmann::json;
 
 constexpr const char* kImageFile = "embedded.spill";
+/// Images are written in such pieces, so that no second one is in memory.
+constexpr size_t kPieceBytes = size_t{1} << 20;
 
-/// Names and paths may have any bytes; text of this format may not.
-json textBytes(const std::string& text) { return std::vector<uint8_t>(text.begin(), text.end()); }
-
-std::string textFrom(const json& j) {
-    const auto bytes = j.get<std::vector<uint8_t>>();
-    return {bytes.begin(), bytes.end()};
+/// Numbers as their bits: a mesh may have some that are none, which text of this format cannot say.
+json bitsOf(std::initializer_list<float> numbers) {
+    json bits = json::array();
+    for (const float each : numbers) bits.push_back(std::bit_cast<uint32_t>(each));
+    return bits;
 }
-
-json vectorJson(glm::vec2 v) { return {v.x, v.y}; }
-json vectorJson(glm::vec3 v) { return {v.x, v.y, v.z}; }
-glm::vec2 vec2From(const json& j) { return {j.at(0).get<float>(), j.at(1).get<float>()}; }
-glm::vec3 vec3From(const json& j) { return {j.at(0).get<float>(), j.at(1).get<float>(), j.at(2).get<float>()}; }
+float numberAt(const json& bits, size_t i) { return std::bit_cast<float>(bits.at(i).get<uint32_t>()); }
 
 /// Images by how they are recorded: null, a path, or the number of one that the mesh holds.
 class ImageWriter {
@@ -32,11 +33,13 @@ public:
     explicit ImageWriter(TempSpace& space) : file_(space, kImageFile) {}
 
     Result<json> record(const ImageSource& image) {
-        if (!image.bytes) return image.path.empty() ? json() : textBytes(image.path.native());
+        if (!image.bytes) return image.path.empty() ? json() : bytesJson(image.path.native());
         const auto [known, isNew] = numbers_.try_emplace(image.bytes.get(), numbers_.size());
         if (!isNew) return json(known->second);
         const auto bytes = std::as_bytes(std::span(*image.bytes));
-        VCP_TRY_ASSIGN(const uint64_t offset, file_.append(bytes));
+        const uint64_t offset = file_.size();
+        for (size_t at = 0; at < bytes.size(); at += kPieceBytes)
+            VCP_TRY(file_.append(bytes.subspan(at, std::min(kPieceBytes, bytes.size() - at))));
         images_.push_back({offset, bytes.size(), XXH3_64bits(bytes.data(), bytes.size())});
         return json(known->second);
     }
@@ -54,25 +57,28 @@ private:
 
 class ImageReader {
 public:
-    static Result<ImageReader> open(const json& images, TempSpace& space) {
+    /// Reads all; without `bytes`, images are empty.
+    static Result<ImageReader> open(const json& images, TempSpace& space, bool bytes) {
         ImageReader reader;
-        if (images.empty()) return reader;
+        reader.images_.assign(images.size(), std::make_shared<std::string>());
+        if (images.empty() || !bytes) return reader;
+        reader.images_.clear();
         TempFile file(space, kImageFile);
         const json& last = images.back();
         VCP_TRY(file.reopen(last.at(0).get<uint64_t>() + last.at(1).get<uint64_t>()));
         for (const json& image : images) {
-            auto bytes = std::make_shared<std::string>(image.at(1).get<size_t>(), '\0');
+            auto held = std::make_shared<std::string>(image.at(1).get<size_t>(), '\0');
             const auto offset = image.at(0).get<uint64_t>();
-            VCP_TRY(file.read(offset, std::as_writable_bytes(std::span(*bytes))));
-            if (XXH3_64bits(bytes->data(), bytes->size()) != image.at(2).get<uint64_t>())
+            VCP_TRY(file.read(offset, std::as_writable_bytes(std::span(*held))));
+            if (XXH3_64bits(held->data(), held->size()) != image.at(2).get<uint64_t>())
                 return damagedTempFile(file.path(), offset);
-            reader.images_.push_back(std::move(bytes));
+            reader.images_.push_back(std::move(held));
         }
         return reader;
     }
     [[nodiscard]] ImageSource image(const json& j) const {
         if (j.is_null()) return {};
-        if (j.is_array()) return {.path = textFrom(j), .bytes = {}};
+        if (j.is_array()) return {.path = textFromBytes(j), .bytes = {}};
         return {.path = {}, .bytes = images_.at(j.get<size_t>())};
     }
 
@@ -87,24 +93,24 @@ Result<json> jsonOf(const Material& m, ImageWriter& images) {
     VCP_TRY_ASSIGN(auto normals, images.record(c.normals));
     VCP_TRY_ASSIGN(auto surface, images.record(c.surface));
     VCP_TRY_ASSIGN(auto emission, images.record(c.emission));
-    return json{{"name", textBytes(m.name)},
+    return json{{"name", bytesJson(m.name)},
                 {"factor", m.factor},
                 {"image", image},
                 {"ignores alpha", m.ignoresAlpha},
                 {"is cut out", m.isCutOut},
                 {"wrap", {int(m.wrapU), int(m.wrapV)}},
                 {"mask", mask},
-                // Any cutoff above 1 says the same.
-                {"mask rule", {std::min(m.mask.cutoff, 2.0), m.mask.sparesGlass, m.mask.mayBeGrey}},
-                {"mask place", {vectorJson(m.mask.uvScale), vectorJson(m.mask.uvOffset)}},
+                {"mask cutoff", std::bit_cast<uint64_t>(m.mask.cutoff)},
+                {"mask rule", {m.mask.sparesGlass, m.mask.mayBeGrey}},
+                {"mask place", bitsOf({m.mask.uvScale.x, m.mask.uvScale.y, m.mask.uvOffset.x, m.mask.uvOffset.y})},
                 {"channel images", {normals, surface, emission}},
-                {"channel factors", {c.normalScale, c.roughness, c.metalness}},
-                {"emission factor", vectorJson(c.emissionFactor)}};
+                {"channel factors", bitsOf({c.normalScale, c.roughness, c.metalness, c.emissionFactor.x,
+                                            c.emissionFactor.y, c.emissionFactor.z})}};
 }
 
 Material materialFrom(const json& j, const ImageReader& images) {
     Material m;
-    m.name = textFrom(j.at("name"));
+    m.name = textFromBytes(j.at("name"));
     m.factor = j.at("factor").get<Rgba8>();
     m.image = images.image(j.at("image"));
     m.ignoresAlpha = j.at("ignores alpha").get<bool>();
@@ -112,19 +118,21 @@ Material materialFrom(const json& j, const ImageReader& images) {
     m.wrapU = Wrap(j.at("wrap").at(0).get<uint8_t>());
     m.wrapV = Wrap(j.at("wrap").at(1).get<uint8_t>());
     m.mask.image = images.image(j.at("mask"));
-    m.mask.cutoff = j.at("mask rule").at(0).get<double>();
-    m.mask.sparesGlass = j.at("mask rule").at(1).get<bool>();
-    m.mask.mayBeGrey = j.at("mask rule").at(2).get<bool>();
-    m.mask.uvScale = vec2From(j.at("mask place").at(0));
-    m.mask.uvOffset = vec2From(j.at("mask place").at(1));
+    m.mask.cutoff = std::bit_cast<double>(j.at("mask cutoff").get<uint64_t>());
+    m.mask.sparesGlass = j.at("mask rule").at(0).get<bool>();
+    m.mask.mayBeGrey = j.at("mask rule").at(1).get<bool>();
+    const json& place = j.at("mask place");
+    m.mask.uvScale = {numberAt(place, 0), numberAt(place, 1)};
+    m.mask.uvOffset = {numberAt(place, 2), numberAt(place, 3)};
     MaterialChannels& c = m.channels;
     c.normals = images.image(j.at("channel images").at(0));
     c.surface = images.image(j.at("channel images").at(1));
     c.emission = images.image(j.at("channel images").at(2));
-    c.normalScale = j.at("channel factors").at(0).get<float>();
-    c.roughness = j.at("channel factors").at(1).get<float>();
-    c.metalness = j.at("channel factors").at(2).get<float>();
-    c.emissionFactor = vec3From(j.at("emission factor"));
+    const json& factors = j.at("channel factors");
+    c.normalScale = numberAt(factors, 0);
+    c.roughness = numberAt(factors, 1);
+    c.metalness = numberAt(factors, 2);
+    c.emissionFactor = {numberAt(factors, 3), numberAt(factors, 4), numberAt(factors, 5)};
     return m;
 }
 
@@ -141,8 +149,8 @@ Result<json> recordMaterials(const std::vector<Material>& materials, TempSpace& 
     return json{{"materials", recorded}, {"images", held}};
 }
 
-Result<std::vector<Material>> recordedMaterials(const json& recorded, TempSpace& space) {
-    VCP_TRY_ASSIGN(const auto images, ImageReader::open(recorded.at("images"), space));
+Result<std::vector<Material>> recordedMaterials(const json& recorded, TempSpace& space, bool withImages) {
+    VCP_TRY_ASSIGN(const auto images, ImageReader::open(recorded.at("images"), space, withImages));
     std::vector<Material> materials;
     for (const json& row : recorded.at("materials")) materials.push_back(materialFrom(row, images));
     return materials;

@@ -15,7 +15,8 @@ namespace vcp {
 /// Returns what to record of materials. Writes the images that they hold to `space`, durably. Errors: Io.
 Result<nlohmann::json> recordMaterials(const std::vector<Material>& materials, TempSpace& space);
 
-/// Returns the materials that were recorded; `space` is that of the part. Errors: Io; InvalidInput (damaged).
-Result<std::vector<Material>> recordedMaterials(const nlohmann::json& recorded, TempSpace& space);
+/// Returns the materials that were recorded; `space` is that of the part. Without `withImages`, images that the mesh
+/// holds are empty. Errors: Io; InvalidInput (damaged).
+Result<std::vector<Material>> recordedMaterials(const nlohmann::json& recorded, TempSpace& space, bool withImages);
 
 }  // namespace vcp

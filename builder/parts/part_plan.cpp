@@ -23,18 +23,24 @@ namespace {
 
 using nlohmann::json;
 
-Result<uint64_t> hashOfFile(const std::filesystem::path& path) {
+struct FileContent {
+    uint64_t hash = 0, bytes = 0;
+};
+
+Result<FileContent> contentOf(const std::filesystem::path& path) {
     const FileDescriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
     if (!file.isOpen()) return systemError(path, "cannot be opened", errno);
     const std::unique_ptr<XXH3_state_t, decltype(&XXH3_freeState)> state(XXH3_createState(), &XXH3_freeState);
     XXH3_64bits_reset(state.get());
     std::vector<char> piece(size_t{1} << 20);
+    uint64_t bytes = 0;
     for (;;) {
         const ssize_t n = ::read(file.number(), piece.data(), piece.size());
-        if (n == 0) return XXH3_64bits_digest(state.get());
+        if (n == 0) return FileContent{XXH3_64bits_digest(state.get()), bytes};
         if (n < 0 && errno == EINTR) continue;
         if (n < 0) return systemError(path, "cannot be read", errno);
         XXH3_64bits_update(state.get(), piece.data(), size_t(n));
+        bytes += uint64_t(n);
     }
 }
 
@@ -47,7 +53,8 @@ json jsonOf(const PartPlan& plan) {
     const BuildOptions& o = plan.options;
     json inputs = json::array();
     for (const PlannedInput& each : plan.inputs)
-        inputs.push_back({{"path", each.path.string()}, {"stamp", each.stamp}, {"hash", each.hash}});
+        inputs.push_back(
+            {{"path", each.path.string()}, {"stamp", each.stamp}, {"hash", each.hash}, {"bytes", each.bytes}});
     return {{"program", plan.program},
             {"parts", plan.parts},
             {"inputs", inputs},
@@ -70,8 +77,8 @@ PartPlan planFrom(const json& j) {
     plan.program = j.at("program").get<std::string>();
     plan.parts = j.at("parts").get<unsigned>();
     for (const json& each : j.at("inputs")) {
-        plan.inputs.push_back(
-            {each.at("path").get<std::string>(), each.at("stamp").get<std::string>(), each.at("hash").get<uint64_t>()});
+        plan.inputs.push_back({each.at("path").get<std::string>(), each.at("stamp").get<std::string>(),
+                               each.at("hash").get<uint64_t>(), each.at("bytes").get<uint64_t>()});
         plan.options.inputs.push_back(plan.inputs.back().path);
     }
     plan.options.output = j.at("output").get<std::string>();
@@ -95,25 +102,30 @@ PartPlan planFrom(const json& j) {
 }  // namespace
 
 Result<std::string> programId() {
-    VCP_TRY_ASSIGN(const auto hash, hashOfFile("/proc/self/exe"));
-    return fmt::format("{} {:016x}", VCP_VERSION, hash);
+    VCP_TRY_ASSIGN(const auto content, contentOf("/proc/self/exe"));
+    return fmt::format("{} {:016x}", VCP_VERSION, content.hash);
 }
 
 Result<std::vector<PlannedInput>> describeInputs(const std::vector<std::filesystem::path>& paths) {
     std::vector<PlannedInput> inputs;
     for (const auto& path : paths) {
         const std::string stamp = fileStamp(path);
-        VCP_TRY_ASSIGN(const auto hash, hashOfFile(path));
-        inputs.push_back({path, stamp, hash});
+        VCP_TRY_ASSIGN(const auto content, contentOf(path));
+        inputs.push_back({path, stamp, content.hash, content.bytes});
     }
     return inputs;
+}
+
+PlannedInput describeSideFile(const SideFile& file) {
+    const auto content = contentOf(file.path);
+    return {file.path, file.stamp, content ? content->hash : 0, content ? content->bytes : 0};
 }
 
 Result<void> checkInput(const PlannedInput& input) {
     // A copy, or another machine's clock, changes the times alone: then the bytes decide.
     if (fileStamp(input.path) == input.stamp) return {};
-    VCP_TRY_ASSIGN(const auto hash, hashOfFile(input.path));
-    if (hash == input.hash) return {};
+    VCP_TRY_ASSIGN(const auto content, contentOf(input.path));
+    if (content.hash == input.hash) return {};
     return Error{.code = ErrorCode::Usage,
                  .message = "was changed since the build was planned; plan it again",
                  .file = input.path.string()};

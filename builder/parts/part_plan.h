@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "builder/build.h"
+#include "builder/stream/side_file.h"
 #include "octree/io/result.h"
 
 namespace vcp {
@@ -18,6 +19,7 @@ struct PlannedInput {
     std::filesystem::path path;
     std::string stamp;  ///< fileStamp
     uint64_t hash = 0;  ///< of all its bytes
+    uint64_t bytes = 0;
 };
 
 struct PartPlan {
@@ -32,6 +34,8 @@ Result<std::string> programId();
 
 /// Describes the inputs as they are. Reads all of them. Errors: Io.
 Result<std::vector<PlannedInput>> describeInputs(const std::vector<std::filesystem::path>& paths);
+/// Describes a file that an input names, as it was when it was read; one that is not there has no bytes.
+PlannedInput describeSideFile(const SideFile& file);
 /// Errors: Usage (the input was changed).
 Result<void> checkInput(const PlannedInput& input);
 

@@ -51,21 +51,32 @@ std::deque<PageSpool> makeSpools(TempSpace& space, uint32_t levels, const char* 
     return spools;
 }
 
+using DoneParts = std::vector<std::shared_ptr<const DonePart>>;
+
+/// Opens all parts of a stage. Errors: openPart's; Usage (PartContext::open).
+Result<DoneParts> openStage(const PartContext& context, const std::string& stage) {
+    DoneParts parts;
+    for (unsigned k = 0; k < context.plan.parts; ++k) {
+        VCP_TRY_ASSIGN(auto part, context.open(stage, k));
+        parts.push_back(std::make_shared<const DonePart>(std::move(part)));
+    }
+    return parts;
+}
+
 /// Bins of one kind that the parts of a stage left, for those that have anything for a part.
 template <class Record>
 class GatheredBins {
 public:
-    /// `field`: which lists the parts that there is anything for.
-    static Result<GatheredBins> open(const PartContext& context, const std::string& stage, const char* field,
-                                     const std::string& name, unsigned number) {
+    /// `parts`: of the stage. `field`: which lists the parts that there is anything for.
+    static Result<GatheredBins> open(const DoneParts& parts, const char* field, const std::string& name,
+                                     unsigned number) {
         GatheredBins all;
-        for (unsigned k = 0; k < context.plan.parts; ++k) {
-            VCP_TRY_ASSIGN(auto part, context.open(stage, k));
-            const auto wanted = part.fields.at(field).template get<std::vector<unsigned>>();
+        for (unsigned k = 0; k < parts.size(); ++k) {
+            const auto wanted = parts[k]->fields.at(field).template get<std::vector<unsigned>>();
             if (std::find(wanted.begin(), wanted.end(), number) == wanted.end()) continue;
-            auto bins = std::make_unique<RecordBins<Record>>(*part.space, name, context.levels.finest.bins(), 0);
-            VCP_TRY(reopenBins(part, name, bins->raw()));
-            all.sources_.push_back({k, std::move(part), std::move(bins)});
+            auto bins = std::make_unique<RecordBins<Record>>(*parts[k]->space, name, 1, 0);
+            VCP_TRY(reopenBins(parts[k]->fields, name, bins->raw()));
+            all.sources_.push_back({k, parts[k], std::move(bins)});
         }
         return all;
     }
@@ -92,7 +103,7 @@ public:
 private:
     struct Source {
         unsigned part;
-        DonePart done;
+        std::shared_ptr<const DonePart> done;
         std::unique_ptr<RecordBins<Record>> bins;
     };
     std::vector<Source> sources_;
@@ -104,17 +115,15 @@ public:
     static Result<FinestBins> open(const PartContext& context, unsigned number) {
         FinestBins all;
         all.folder_ = context.folder;
-        VCP_TRY_ASSIGN(all.triangles_, Triangles::open(context, "vertices", "for", "level", number));
-        VCP_TRY_ASSIGN(all.vertices_, Vertices::open(context, "vertices", "for", "normals", number));
-        std::vector<DonePart> parts;
+        VCP_TRY_ASSIGN(const auto parts, openStage(context, "vertices"));
+        VCP_TRY_ASSIGN(all.triangles_, Triangles::open(parts, "for", "level", number));
+        VCP_TRY_ASSIGN(all.vertices_, Vertices::open(parts, "for", "normals", number));
         std::vector<std::unique_ptr<PartNotes>> notes;
         std::vector<PartNotes*> joined;
-        for (unsigned k = 0; k < context.plan.parts; ++k) {
-            VCP_TRY_ASSIGN(auto part, context.open("vertices", k));
-            notes.push_back(std::make_unique<PartNotes>(*part.space, 0));
-            VCP_TRY(reopenBins(part, "parts", notes.back()->raw()));
+        for (const auto& part : parts) {
+            notes.push_back(std::make_unique<PartNotes>(*part->space, 0));
+            VCP_TRY(reopenBins(part->fields, "parts", notes.back()->raw()));
             joined.push_back(notes.back().get());
-            parts.push_back(std::move(part));
         }
         VCP_TRY_ASSIGN(all.meshParts_, PartNotes::join(joined));
         return all;
@@ -196,13 +205,17 @@ Result<MemoryPlan> PartSetting::divideMemory() const {
 
 Result<void> recordBins(RawBins& bins, const std::string& name, json& files) {
     VCP_TRY(bins.sync());
-    files[name] = bins.bytes();
+    const RawBins::Index index = bins.index();
+    files[name] = {{"bytes", bins.bytes()}, {"last", index.last}, {"counts", index.counts}};
     return {};
 }
 
-Result<void> reopenBins(const DonePart& part, const std::string& name, RawBins& bins) {
-    const auto bytes = part.fields.at("files").at(name).get<uint64_t>();
-    return bytes > 0 ? bins.reopen(bytes) : Result<void>();
+Result<void> reopenBins(const json& fields, const std::string& name, RawBins& bins) {
+    const json& recorded = fields.at("files").at(name);
+    const auto bytes = recorded.at("bytes").get<uint64_t>();
+    if (bytes == 0) return {};
+    return bins.reopen(
+        bytes, {recorded.at("last").get<std::vector<uint64_t>>(), recorded.at("counts").get<std::vector<uint64_t>>()});
 }
 
 std::vector<unsigned> partsWith(const PartContext& context, std::initializer_list<const RawBins*> bins) {
@@ -253,8 +266,12 @@ Result<PartContext> openCounted(const PartSetting& setting) {
     context.firstBins = context.counted.fields.at("first bins").get<std::vector<size_t>>();
     if (context.firstBins.size() != size_t{context.plan.parts} + 1) return damagedTempFile(journal);
     const Recorded& recorded = context.recorded;
-    const std::string chosen = json{recorded.levelsLess, recorded.parted, recorded.partition, context.firstBins,
-                                    context.counted.fields.at("placed")}
+    const std::string chosen = json{recorded.levelsLess,
+                                    recorded.parted,
+                                    recorded.partition,
+                                    context.firstBins,
+                                    context.counted.fields.at("placed"),
+                                    context.counted.fields.at("read")}
                                    .dump();
     context.bins = fmt::format("{:016x}", XXH3_64bits(chosen.data(), chosen.size()));
     return context;
@@ -278,10 +295,11 @@ Result<void> runVertices(const PartContext& context, unsigned number, NewPart& m
     const LevelPlan& levels = context.levels;
     const size_t bins = levels.finest.bins();
     TempSpace& space = made.space(context.memory.tempBytes);
-    VCP_TRY_ASSIGN(const auto dealt, GatheredBins<LatticeTriangle>::open(context, "deal", "for", "level", number));
+    VCP_TRY_ASSIGN(const auto parts, openStage(context, "deal"));
+    VCP_TRY_ASSIGN(const auto dealt, GatheredBins<LatticeTriangle>::open(parts, "for", "level", number));
     RecordBins<LatticeTriangle> triangles(space, "level", bins, context.memory.bufferBytes);
     RecordBins<VertexImage> vertices(space, "normals", bins, context.memory.bufferBytes / 4);
-    PartNotes parts(space, context.memory.bufferBytes / 16);
+    PartNotes notes(space, context.memory.bufferBytes / 16);
     const PageGrid grid = levels.gridOf(levels.levels() - 1);
     LevelSink sink(levels.pages, levels.finest, triangles, levels.marginCells());
     VertexStep step(grid, levels.finest, vertices, sink);
@@ -290,13 +308,13 @@ Result<void> runVertices(const PartContext& context, unsigned number, NewPart& m
         if (!(*context.progress)(double(bin - first) / double(end - first))) return Error::cancelled();
         VCP_TRY_ASSIGN(auto soup, dealt.load(bin));
         if (soup.empty()) continue;
-        VCP_TRY_ASSIGN(const auto mesh, meshWithNormals(levels, std::move(soup), bin, context.hasColour, parts));
+        VCP_TRY_ASSIGN(const auto mesh, meshWithNormals(levels, std::move(soup), bin, context.hasColour, notes));
         VCP_TRY(step.run(bin, mesh));
     }
     json files;
     VCP_TRY(recordBins(triangles.raw(), "level", files));
     VCP_TRY(recordBins(vertices.raw(), "normals", files));
-    VCP_TRY(recordBins(parts.raw(), "parts", files));
+    VCP_TRY(recordBins(notes.raw(), "parts", files));
     return made.finish(
         {{"bins", context.bins}, {"files", files}, {"for", partsWith(context, {&triangles.raw(), &vertices.raw()})}});
 }
@@ -308,8 +326,12 @@ Result<void> runPages(const PartContext& context, unsigned number, NewPart& made
     std::deque<PageSpool> pages = makeSpools(space, levels.frame.levels, ""),
                           surfaces = makeSpools(space, levels.frame.levels, "surface"),
                           kept = makeSpools(space, levels.frame.levels, "kept");
-    VCP_TRY_ASSIGN(const auto textures,
-                   GatheredBins<TexturedTriangle>::open(context, "deal", "textured", "textures", number));
+    GatheredBins<TexturedTriangle> textures;
+    const bool hasTextures = !context.counted.fields.at("placed").empty();
+    if (hasTextures) {
+        VCP_TRY_ASSIGN(const auto dealt, openStage(context, "deal"));
+        VCP_TRY_ASSIGN(textures, GatheredBins<TexturedTriangle>::open(dealt, "textured", "textures", number));
+    }
     const size_t first = context.firstBins[number], end = context.firstBins[number + 1];
     for (size_t bin = first; bin < end; ++bin) {
         const auto report = [&](double part) {
@@ -319,7 +341,7 @@ Result<void> runPages(const PartContext& context, unsigned number, NewPart& made
         if (soup.empty()) continue;
         LatticeMesh mesh = meshOf(soup, context.hasColour);
         std::vector<LatticeTriangle>().swap(soup);
-        if (!context.counted.fields.at("placed").empty()) {
+        if (hasTextures) {
             VCP_TRY_ASSIGN(auto known, textures.load(bin));
             addTextures(mesh, std::move(known));
         }

@@ -51,10 +51,10 @@ Result<PartContext> openCounted(const PartSetting& setting);
 /// Opens what `count` left. Errors: those of openCounted, Limit (too little memory).
 Result<PartContext> openContext(const PartSetting& setting);
 
-/// Makes bins durable and notes their length in `files`. Errors: Io.
+/// Makes bins durable and notes in `files` where they are. Errors: Io.
 Result<void> recordBins(RawBins& bins, const std::string& name, nlohmann::json& files);
-/// Opens bins of a part that is done, as they were recorded. Errors: Io; InvalidInput (damaged).
-Result<void> reopenBins(const DonePart& part, const std::string& name, RawBins& bins);
+/// Opens bins of a part that is done, as they were recorded in its `fields`. Errors: Io; InvalidInput (damaged).
+Result<void> reopenBins(const nlohmann::json& fields, const std::string& name, RawBins& bins);
 /// Returns the parts of the later stages whose bins have anything of these.
 std::vector<unsigned> partsWith(const PartContext& context, std::initializer_list<const RawBins*> bins);
 

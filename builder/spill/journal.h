@@ -4,12 +4,23 @@
 // is appended only after the bytes that it speaks of are durable; a torn or damaged line counts as absent.
 #pragma once
 
+#include <cstdint>
+#include <string>
+#include <vector>
+
 #include <nlohmann/json.hpp>
 
 #include "builder/spill/temp_folder.h"
 #include "octree/io/result.h"
 
 namespace vcp {
+
+/// Returns text that need not be UTF-8, as names of files, for a journal, and such text from it.
+inline nlohmann::json bytesJson(const std::string& text) { return std::vector<uint8_t>(text.begin(), text.end()); }
+inline std::string textFromBytes(const nlohmann::json& bytes) {
+    const auto all = bytes.get<std::vector<uint8_t>>();
+    return {all.begin(), all.end()};
+}
 
 class Journal {
 public:

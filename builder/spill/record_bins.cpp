@@ -211,6 +211,24 @@ Result<void> RawBins::reopen(uint64_t bytes) {
     return {};
 }
 
+RawBins::Index RawBins::index() const {
+    Index index;
+    for (const Bin& bin : bins_) {
+        index.last.push_back(bin.last);
+        index.counts.push_back(bin.count);
+    }
+    return index;
+}
+
+Result<void> RawBins::reopen(uint64_t bytes, const Index& index) {
+    VCP_TRY(file_.reopen(bytes));
+    for (size_t bin = 0; bin < std::min(index.last.size(), index.counts.size()); ++bin) {
+        binAt(bin).last = index.last[bin];
+        binAt(bin).count = index.counts[bin];
+    }
+    return {};
+}
+
 void RawBins::remove() {
     file_.remove();
     bins_.assign(bins_.size(), {});

@@ -26,9 +26,9 @@ bool isOfABuild(std::string_view name) {
     name.remove_suffix(std::string_view(kTempSuffix).size());
     name = name.substr(0, name.find_last_not_of("0123456789") + 1);
     constexpr std::string_view kWords[] = {
-        "floats",         "doubles",   "vertices",    "waiting",      "level",     "normals",
-        "parts",          "keptpages", "keptentries", "pages",        "entries",   "surfacepages",
-        "surfaceentries", "textures",  "imagepages",  "imageentries", "tilepages", "tileentries"};
+        "floats",     "doubles",      "vertices",  "waiting",     "level",        "normals",        "parts",
+        "keptpages",  "keptentries",  "pages",     "entries",     "surfacepages", "surfaceentries", "textures",
+        "imagepages", "imageentries", "tilepages", "tileentries", "embedded"};
     return std::find(std::begin(kWords), std::end(kWords), name) != std::end(kWords);
 }
 

@@ -1,4 +1,6 @@
 // vcp build-plan and vcp build-step: a build in parts, for engines that run many processes.
+#include <sys/resource.h>
+
 #include <fmt/format.h>
 
 #include "builder/parts/build_parts.h"
@@ -61,8 +63,17 @@ Result<int> run(const PlanCommand& command) {
     return 0;
 }
 
+/// A part may read files of all parts of the stage before, more than most systems allow unless they are asked.
+void allowManyFiles() {
+    rlimit files{};
+    if (::getrlimit(RLIMIT_NOFILE, &files) != 0) return;
+    files.rlim_cur = files.rlim_max;
+    ::setrlimit(RLIMIT_NOFILE, &files);
+}
+
 Result<int> run(const StepCommand& command) {
     const InterruptScope catching;
+    allowManyFiles();
     const auto ran = runPart(PartStep{.folder = command.plan,
                                       .stage = command.stage,
                                       .number = command.number,

@@ -24,6 +24,12 @@ std::string bytesOf(const fs::path& path) {
     return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
 }
 
+void spoil(const fs::path& file) {
+    std::string content = bytesOf(file);
+    content[content.size() / 2] = char(content[content.size() / 2] ^ 1);
+    std::ofstream(file, std::ios::binary) << content;
+}
+
 /// Triangles across many bins, an open part and a closed one, coordinates far from zero.
 IndexedMesh mixedMesh() {
     IndexedMesh mesh = test::randomTriangles(200, 5, true);
@@ -276,10 +282,8 @@ TEST_F(BuildParts, AnotherProgramIsRefused) {
 TEST_F(BuildParts, ChangedInputsAreRefusedAndTouchedOnesAreNot) {
     planned(1);
     fs::last_write_time(input(), fs::file_time_type::clock::now() + std::chrono::hours(1000));
-    std::string content = bytesOf(input());
-    content[content.size() / 2] ^= 1;
     const std::string before = bytesOf(input());
-    std::ofstream(input(), std::ios::binary) << content;
+    spoil(input());
     expectRefused(run("read", 0), ErrorCode::Usage, "was changed since");
     std::ofstream(input(), std::ios::binary) << before;
     EXPECT_TRUE(run("read", 0).ok());
@@ -322,6 +326,88 @@ TEST_F(BuildParts, OfTilesEachPartDealsItsOwn) {
         ASSERT_NO_FATAL_FAILURE(runAll(stage.name, stage.parts, 3));
     }
     EXPECT_EQ(bytesOf(output()), whole);
+}
+
+/// Who reads what is planned: an input that is gone meanwhile changes no part's share.
+TEST_F(BuildParts, AnInputThatIsGoneIsMissedByItsOwnPartAlone) {
+    BuildOptions o = options();
+    o.inputs.clear();
+    for (size_t tile = 0; tile < 4; ++tile) {
+        o.inputs.push_back(folder_ / ("tile" + std::to_string(tile) + ".ply"));
+        test::writePly(test::sphereMesh({30.0 * double(tile), 20, 20}, 9, 40), o.inputs.back());
+    }
+    const auto built = buildOctree(o);
+    ASSERT_TRUE(built.ok()) << built.error().line();
+    const std::string whole = bytesOf(output());
+    fs::remove(output());
+    ASSERT_TRUE(planParts(o, 2).ok());
+    ASSERT_TRUE(run("read", 0).ok());
+    fs::remove(o.inputs[0]);
+    ASSERT_TRUE(run("read", 1).ok());
+    for (const PartStage& stage : stagesOf(2)) ASSERT_NO_FATAL_FAILURE(runAll(stage.name, stage.parts));
+    EXPECT_EQ(bytesOf(output()), whole);
+    fs::remove_all(plan() / "read-0");
+    expectRefused(run("read", 0), ErrorCode::Io, "tile0.ply");
+}
+
+/// With less memory triangles come in another order, and so would go to other parts than before.
+TEST_F(BuildParts, ReadAgainInAnotherOrderIsRefused) {
+    planned(2);
+    ASSERT_NO_FATAL_FAILURE(runAll("read", 2));
+    ASSERT_TRUE(run("count", 0).ok());
+    ASSERT_TRUE(run("deal", 0).ok());
+    // The same mesh, its triangles turned about, stands for what another memory makes of the order.
+    const fs::path other = folder_ / "other";
+    fs::create_directory(other);
+    IndexedMesh mesh = mixedMesh();
+    std::reverse(mesh.triangles.begin(), mesh.triangles.end());
+    BuildOptions turned = options();
+    turned.inputs = {other / "mesh.ply"};
+    turned.output = other / "out.vcp";
+    test::writePly(mesh, turned.inputs[0], std::vector<uint32_t>(mesh.positions.size(), 7));
+    const auto folder = planParts(turned, 2);
+    ASSERT_TRUE(folder.ok());
+    ASSERT_TRUE(runPart({.folder = *folder, .stage = "read", .number = 0, .threads = 1}).ok());
+    fs::rename(plan() / "read-0", folder_ / "read-0");
+    fs::rename(*folder / "read-0", plan() / "read-0");
+    expectRefused(run("deal", 1), ErrorCode::Usage, "count 0");
+    fs::remove_all(plan() / "count-0");
+    ASSERT_TRUE(run("count", 0).ok());
+    expectRefused(run("deal", 0), ErrorCode::Usage, "deal 0");
+    // The same reading again, whoever did what, is as good.
+    fs::remove_all(plan() / "read-0");
+    fs::remove_all(plan() / "count-0");
+    fs::rename(folder_ / "read-0", plan() / "read-0");
+    ASSERT_TRUE(run("count", 0).ok());
+    EXPECT_TRUE(run("deal", 0)->wasDone);
+    fs::remove_all(plan() / "read-0");
+    ASSERT_TRUE(run("read", 0).ok());
+    EXPECT_TRUE(run("deal", 1).ok());
+}
+
+TEST_F(BuildParts, WhatAMeshNamesMayNotChangeMeanwhile) {
+    const fs::path material = folder_ / "square.mtl", mesh = folder_ / "square.obj";
+    std::ofstream(mesh) << "mtllib square.mtl\nusemtl paint\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\n"
+                           "f 1/1 2/2 3/3\n";
+    std::ofstream(material) << "newmtl paint\nKd 1 0 0\nKe nan nan nan\nmap_Ke missing.png\n";
+    BuildOptions o = options();
+    o.inputs = {mesh};
+    const auto built = buildOctree(o);
+    ASSERT_TRUE(built.ok()) << built.error().line();
+    const std::string whole = bytesOf(output());
+    fs::remove(output());
+    ASSERT_TRUE(planParts(o, 1).ok());
+    ASSERT_TRUE(run("read", 0).ok());
+    const std::string before = bytesOf(material);
+    spoil(material);
+    expectRefused(run("count", 0), ErrorCode::Usage, "square.mtl");
+    std::ofstream(material, std::ios::binary) << before;
+    ASSERT_TRUE(run("count", 0).ok()) << "the bytes decide, not the times";
+    spoil(material);
+    expectRefused(run("deal", 0), ErrorCode::Usage, "square.mtl");
+    std::ofstream(material, std::ios::binary) << before;
+    for (const PartStage& stage : stagesOf(1)) ASSERT_NO_FATAL_FAILURE(runAll(stage.name, stage.parts));
+    EXPECT_EQ(bytesOf(output()), whole) << "numbers that are none count for nothing in parts as well";
 }
 
 TEST_F(BuildParts, WhatCannotBePlanned) {
