@@ -13,19 +13,21 @@ function cast({ view, sample, begun, needed, tables, copies, dropped, first, cou
     return { ...module.castBands(view, rows, first, count, shows), said: module.said() };
 }
 
-self.onmessage = ({ data: { port } }) => {
-    port.onmessage = async ({ data }) => {
+self.onmessage = async ({ data: { port, compiled, lead } }) => {
+    const fail = () => port.postMessage({ type: 'failed' }); // the first worker does without
+    try {
+        module = await Module.load(compiled);
+        module.follow(lead);
+    } catch {
+        return fail();
+    }
+    port.onmessage = ({ data }) => {
         try {
-            if (data.type === 'follow') {
-                module = await Module.load(data.compiled);
-                module.follow(data.lead);
-                port.postMessage({ type: 'ready' });
-            } else {
-                const done = cast(data);
-                port.postMessage({ type: 'cast', ...done, memoryBytes: module.memoryBytes() }, done.pixels ? [done.pixels.buffer] : []);
-            }
+            const done = cast(data);
+            port.postMessage({ type: 'cast', ...done, memoryBytes: module.memoryBytes() }, done.pixels ? [done.pixels.buffer] : []);
         } catch {
-            port.postMessage({ type: 'failed' }); // the first worker does without
+            fail();
         }
     };
+    port.postMessage({ type: 'ready' });
 };

@@ -178,8 +178,9 @@ export class VcpViewer extends HTMLElement {
         this.worker = null;
         this.casters = [];
     }
-    /// Starts the workers beside the first one, which speaks to each through a channel.
-    startCasters() {
+    /// Starts the workers beside the first one, which speaks to each through a channel. `start`: what they begin with; not
+    /// every browser lets compiled modules through channels.
+    startCasters(start) {
         const { others, shareBytes } = this.shared;
         for (let number = 0; number < others; ++number) {
             const caster = new Worker(new URL('./caster.js', import.meta.url), { type: 'module' });
@@ -188,8 +189,8 @@ export class VcpViewer extends HTMLElement {
                 event.preventDefault(); // the first worker does without it
                 first.postMessage({ type: 'lost', number });
             };
-            caster.postMessage({ port: port1 }, [port1]);
             first.postMessage({ type: 'caster', number, port: port2, shareBytes }, [port2]);
+            caster.postMessage({ port: port1, ...start }, [port1]);
             this.casters.push(caster);
         }
     }
@@ -218,7 +219,7 @@ export class VcpViewer extends HTMLElement {
         if (message.type === 'opened') {
             this.info = message.info;
             if (!this.info.hasColour) this.parts.select.querySelector('[value="unlit"]')?.remove();
-            this.startCasters();
+            this.startCasters(message.start);
             this.fit();
             const link = /(?:^#|&)vcp=([^&]+)/.exec(location.hash);
             if (link && this.orbit.fromText(decodeURIComponent(link[1]))) this.look(false);

@@ -9,11 +9,12 @@ const kLead = 64 << 10;      // bytes of the first request: header, directory an
 const kGap = 32 << 10;       // pages, and pieces of images, so near each other are fetched in one request
 const kMostBytes = 256 << 10; // of one request
 const kAtOnce = 12, kBytesAtOnce = 1 << 20; // requests, and bytes that they ask for
+const kAtFirst = 2, kBytesAtFirst = kMostBytes; // until there is a picture, which comes sooner where nothing else does
 const kFrameMs = 16; // between frames that nothing else asks for
 const kSamples = 8;          // of a pixel, where a view is at rest
 
 let told = null; // the picture that was said to be settled
-let module, ranges, view = null, awake = null, failed = null, drawn = null, hidden = false, decoding = 0;
+let module, ranges, view = null, awake = null, failed = null, drawn = null, hidden = false, hasShown = false, decoding = 0;
 const asked = new Set(); // stretches under way
 let fetched = []; // stretches that came
 const casters = []; // the other workers
@@ -42,19 +43,20 @@ async function open({ url, wasm, budgetBytes, draw }) {
     module.supply(0, lead);
     ranges.placeOf = offset => module.placeOf(offset);
     while (!module.open()) await supply(module.missing());
-    post('opened', { info: module.info() });
+    post('opened', { info: module.info(), start: { compiled: module.compiled, lead: module.lead() } });
 }
 
 /// Fetches what the module misses, the most urgent first; the loop goes on when it has come.
 function fetchMissing() {
     const underWay = [...asked], missing = without(module.missing(), underWay);
     let bytesAsked = underWay.reduce((sum, run) => sum + run.bytes, 0);
+    const [mostRequests, mostBytes] = hasShown ? [kAtOnce, kBytesAtOnce] : [kAtFirst, kBytesAtFirst];
     for (const run of urgentFirst(joined(missing, kGap, kMostBytes), missing)) {
         // What is joined may have something between that is under way, or was fetched before.
         const there = [...underWay, ...without(fetched.filter(one => overlap(one, run)), missing)];
         for (const part of without([run], there)) {
             const [wanted] = joined(missing.filter(one => overlap(one, part)), Infinity, Infinity);
-            if (asked.size >= kAtOnce || bytesAsked >= kBytesAtOnce) return;
+            if (asked.size >= mostRequests || bytesAsked >= mostBytes) return;
             if (!wanted) continue;
             bytesAsked += wanted.bytes;
             fetchPart(wanted);
@@ -187,6 +189,7 @@ function show({ width, height, number, moving }, update, samples, picture, ms) {
     const gpuBytes = choice.gpu?.bytes() ?? 0, workers = byGpu ? 1 : 1 + ready.length, drawnBy = byGpu ? 'webgl' : 'processor';
     post('picture', { width, height, ...picture, number, samples, fetched, update, memoryBytes, gpuBytes, workers, drawnBy, moving, ms },
         [picture.bitmap ?? picture.pixels.buffer]);
+    hasShown = true;
     choice.start();
 }
 
@@ -252,9 +255,7 @@ self.onmessage = async ({ data }) => {
         } else if (data.type === 'pick') {
             post('picked', { id: data.id, hit: hitAt(data) });
         } else if (data.type === 'caster') {
-            // It takes part from the next picture on.
-            casters[data.number] = new Caster(data.port, data.shareBytes);
-            data.port.postMessage({ type: 'follow', compiled: module.compiled, lead: module.lead() });
+            casters[data.number] = new Caster(data.port, data.shareBytes); // takes part once it is ready
         } else if (data.type === 'lost') {
             casters[data.number].lose();
         } else if (data.type === 'hide') {

@@ -86,6 +86,13 @@ class Page {
             ask('Target.setAutoAttach', { autoAttach: true, waitForDebuggerOnStart: false, flatten: true })]);
     }
 
+    go(url) {
+        return this.call('Page.navigate', { url });
+    }
+    /// What its console and its workers' complain of.
+    complaints() {
+        return this.errors;
+    }
     /// What an expression of the page is, or what its promise becomes.
     async evaluate(expression) {
         const answer = await this.call('Runtime.evaluate', { expression, awaitPromise: true, returnByValue: true });
@@ -107,6 +114,13 @@ class Page {
     async click(x, y) {
         for (const type of ['mousePressed', 'mouseReleased'])
             await this.call('Input.dispatchMouseEvent', { type, x, y, button: 'left', clickCount: 1 });
+    }
+    hover(x, y) {
+        return this.call('Input.dispatchMouseEvent', { type: 'mouseMoved', x, y });
+    }
+    /// The wheel turns at a place, by pixels.
+    wheel(x, y, deltaY) {
+        return this.call('Input.dispatchMouseEvent', { type: 'mouseWheel', x, y, deltaX: 0, deltaY });
     }
     /// Fingers go along: a list of places of all fingers, each an array of { x, y }.
     async touch(places) {

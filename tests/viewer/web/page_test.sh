@@ -1,35 +1,45 @@
 #!/usr/bin/env bash
-# A published page in Chromium: page_test.sh NODE WEB_FOLDER VCP MAKE_SCAN FOLDER
+# A published page in a browser: page_test.sh chromium|firefox NODE WEB_FOLDER VCP MAKE_SCAN FOLDER
+# Chromium does everything; Firefox what browsers may do otherwise.
 set -euo pipefail
-node=$1 web=$2 vcp=$3 make_scan=$4 folder=$5
-if [ ! -e "$web/vcp.wasm" ] || ! command -v chromium >/dev/null; then
-    echo "The target web was not built, or there is no Chromium: skipped"
+browser=$1 node=$2 web=$3 vcp=$4 make_scan=$5 folder=$6
+case $browser in
+    chromium) start=(chromium --headless=new --no-sandbox --disable-gpu --disable-dev-shm-usage --dump-dom) ;;
+    firefox) start=(firefox-esr --headless --no-remote --profile "$folder/profile" --screenshot "$folder/blank.png") ;;
+esac
+if [ ! -e "$web/vcp.wasm" ] || ! command -v "${start[0]}" >/dev/null; then
+    echo "The target web was not built, or there is no $browser: skipped"
     exit 77
 fi
-if ! timeout 120 chromium --headless=new --no-sandbox --disable-gpu --disable-dev-shm-usage --dump-dom about:blank \
-    >/dev/null 2>&1; then
-    echo "Chromium does not start here: skipped"
+rm -rf "$folder"
+mkdir -p "$folder/profile"
+if ! timeout 120 "${start[@]}" about:blank >/dev/null 2>&1; then
+    echo "$browser does not start here: skipped"
     exit 77
 fi
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
-rm -rf "$folder"
-mkdir -p "$folder"
 cd "$folder"
-for triangles in 10000 60000 300000; do
-    "$make_scan" --triangles "$triangles" --colour -o scan.ply
+# page TRIANGLES KIND: the page of a scan.
+page() {
+    "$make_scan" --triangles "$1" --colour -o scan.ply
     "$vcp" build scan.ply -o scan.vcp --overwrite --progress none
-    "$vcp" publish scan.vcp -o "site$triangles" --viewer "$web" >/dev/null
-    mkdir "pictures$triangles"
-    "$node" "$here/page_test.mjs" "$vcp" "site$triangles" "pictures$triangles"
-done
+    "$vcp" publish scan.vcp -o "site$1" --viewer "$web" >/dev/null
+    mkdir "pictures$1"
+    "$node" "$here/page_test.mjs" "$browser" "$vcp" "site$1" "pictures$1" $2
+}
+if [ "$browser" = firefox ]; then
+    page 60000 short
+    exit
+fi
+for triangles in 10000 60000 300000; do page $triangles ""; done
 "$vcp" shard scan.vcp -o shards --size 64K --progress none >/dev/null
 "$vcp" publish shards -o siteshards --viewer "$web" >/dev/null
 cp scan.vcp siteshards/whole.vcp
 mkdir picturesshards
-"$node" "$here/page_test.mjs" "$vcp" siteshards picturesshards shards
+"$node" "$here/page_test.mjs" "$browser" "$vcp" siteshards picturesshards shards
 "$node" "$here/textured_scene.mjs" . 200 1024
 "$vcp" build textured.obj -o scan.vcp --colour-quality lossless --overwrite --progress none
 "$vcp" publish scan.vcp -o siteimages --viewer "$web" >/dev/null
 "$vcp" build textured.obj -o siteimages/jpeg.vcp --colour-quality 85 --overwrite --progress none
 mkdir picturesimages
-"$node" "$here/page_test.mjs" "$vcp" siteimages picturesimages images
+"$node" "$here/page_test.mjs" "$browser" "$vcp" siteimages picturesimages images
