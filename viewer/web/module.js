@@ -126,24 +126,25 @@ export class Module {
     /// `view`: eye, forward, up, fov (radians, from the lower to the upper edge), width, height; what is left out below
     /// is as here. `light`: towards it, in the camera's axes (right, up, back). `section`: { normal, offset }: what has
     /// dot(normal, x) >= offset is kept. `environment`: 0, or 1 + the number of surroundings (studio, overcast, clear) in
-    /// place of the light. `upright`: the axis that points up. `plain`: materials' channels are not shown.
+    /// place of the light. `upright`: the axis that points up. `plain`: materials' channels are not shown. `colourError`: ΔE.
     look(view) {
         const { eye, forward, up, fov, width, height, errorPixels = 0.5, mode = 0, shadows = false, occlusionRays = 0,
             top = [0, 0, 0], bottom = [0, 0, 0], light = [-0.35, 0.55, 0.75], section = null, environment = 0,
-            upright = [0, 1, 0], plain = false } = view;
+            upright = [0, 1, 0], plain = false, colourError = 6 } = view;
         const cut = section ? [1, ...section.normal, section.offset] : [0, 0, 0, 0, 0];
         const numbers = [...eye, ...forward, ...up, fov, width, height, errorPixels, mode, Number(shadows), occlusionRays,
             ...top, ...bottom, ...light, ...cut, environment, ...upright,
-            Number(!plain)];
+            Number(!plain), colourError];
         this.with(new Float64Array(numbers), at => this.wasm.vcp_look(at));
     }
     update() {
         const bits = this.checked(this.wasm.vcp_update());
         const n = this.numbers(this.wasm.vcp_numbers(), 8);
+        const limitedBy = n[7] > n[0] ? 'colour' : 'geometry';
         return {
             drawable: (bits & 1) !== 0, settled: (bits & 2) !== 0, awaitsRays: (bits & 4) !== 0, changed: (bits & 8) !== 0,
             errorPixels: n[0], residentBytes: n[1], pagesMissing: n[2], pagesInCut: n[3], failures: n[4],
-            relaxed: n[5] === 1, problem: n[6] > 0 ? this.error() : null, colourPixels: n[7],
+            relaxed: n[5] === 1, problem: n[6] > 0 ? this.error() : null, colourPixels: n[7], limitedBy,
         };
     }
     /// Begins a sample of the view: 0 draws the last update's cut, others add to that picture. Returns how many bands of

@@ -10,6 +10,7 @@ const kRestMs = 160; // without a movement: the view is at rest
 const kSaidMs = 4000; // a line that answers a button stands as long
 const kTapMs = 300, kTapPixels = 24; // two taps so near each other are one double tap
 const kMostPixels = 1.6e6;
+const kColourError = 6; // ΔE that may be seen, where nothing else is asked for
 const kPhoneBudget = 64 << 20, kBudget = 192 << 20; // of decoded pages, in all workers
 const kWorkerBudget = 32 << 20, kLeastShare = 1 << 20; // of the budget for each worker more; of what it holds of pages
 const kMostWorkers = 8;
@@ -30,6 +31,12 @@ function sharedBudget(budgetBytes, asked) {
     return { pageBytes: budgetBytes - others * shareBytes, others, shareBytes };
 }
 
+/// The number that an attribute says, at least 0; `usual` where it says none.
+function numberOf(text, usual) {
+    const number = parseFloat(text);
+    return number >= 0 ? number : usual;
+}
+
 /// A length for people: three digits.
 function lengthText(x) {
     return x === 0 ? '0' : Number(x.toPrecision(3)).toString();
@@ -43,7 +50,7 @@ function measureText(x, error) {
 
 export class VcpViewer extends HTMLElement {
     static observedAttributes = ['src', 'mode', 'annotations', 'theme', 'light', 'environment', 'shadows', 'occlusion', 'plain',
-        'section', 'up'];
+        'section', 'up', 'colour-error'];
 
     constructor() {
         super();
@@ -279,10 +286,11 @@ export class VcpViewer extends HTMLElement {
         const pixels = this.clientWidth * this.clientHeight * dense * dense;
         const scale = dense * Math.min(1, Math.sqrt(kMostPixels / pixels)) * (moving ? this.movingScale : 1);
         const width = Math.max(1, Math.round(this.clientWidth * scale)), height = Math.max(1, Math.round(this.clientHeight * scale));
+        const colourError = numberOf(this.getAttribute('colour-error'), kColourError);
         const { up, forward } = this.orbit.axes(), mode = kModes[this.mode] ?? 0, theme = kTheme[this.dataset.theme];
         this.worker.postMessage({
             type: 'look', width, height, moving, mode, number: ++this.number,
-            eye: this.orbit.eye(), forward, up, fov: kFieldOfView, errorPixels: moving ? 1 : 0.5,
+            eye: this.orbit.eye(), forward, up, fov: kFieldOfView, errorPixels: moving ? 1 : 0.5, colourError,
             shadows: this.hasAttribute('shadows'), plain: this.hasAttribute('plain'),
             occlusionRays: this.hasAttribute('occlusion') && !moving ? kOcclusionRays : 0,
             top: theme.top, bottom: theme.bottom, light: this.light.direction(),

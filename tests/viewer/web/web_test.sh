@@ -15,8 +15,13 @@ cp "$web"/*.js "$web/vcp.wasm" .
 echo '{ "type": "module" }' >package.json
 echo '{ "position": [3.5, 4, 7], "target": [0, 0.86, 0], "fov_degrees": 34 }' >whole.json
 echo '{ "position": [0.8, 1.9, 1.6], "target": [0, 1.1, 0], "fov_degrees": 34 }' >close.json
-for view in whole close; do
-    "$vcp" render scan.vcp --device host --camera $view.json --size 320x200 --depth $view.pfm -o $view.png --overwrite --progress none
+echo '{ "position": [35, 40, 70], "target": [0, 0.86, 0], "fov_degrees": 34 }' >far.json
+cp far.json tolerant.json
+for view in whole close far tolerant; do
+    colours=6
+    [ $view != tolerant ] || colours=10
+    "$vcp" render scan.vcp --device host --camera $view.json --size 320x200 --colour-error $colours --depth $view.pfm -o $view.png \
+        --overwrite --progress none --json >$view.said
 done
 "$make_scan" --triangles 10000 --colour -o small.ply
 "$vcp" build small.ply -o small.vcp --overwrite --progress none
@@ -44,7 +49,7 @@ rm -rf shards
 "$vcp" shard large.vcp -o shards --size 64K --progress none
 "$hostile_files" hostile.bin 2000 "$here"/../../fuzz/seeds/fuzz_file/* small.vcp small/lossless.vcp small/jpeg.vcp \
     textured/channels.vcp
-"$node" "$here/module_test.mjs" "$folder" scan.vcp hostile.bin whole close
+"$node" "$here/module_test.mjs" "$folder" scan.vcp hostile.bin whole close far tolerant
 "$node" "$here/image_test.mjs" "$folder" textured
 # The folder is a package for npm that needs no other one.
 if command -v npm >/dev/null; then

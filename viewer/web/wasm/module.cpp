@@ -306,7 +306,7 @@ void setEnvironment(Shading& shading, size_t number, glm::vec3 up) {
 /// pixels, ShadingMode, shadows, rays of ambient occlusion, background at the top and at the bottom (three each),
 /// direction towards the light in the camera's axes (right, up, back), whether there is a section, its normal (three)
 /// and offset, 0 or 1 + the number of an environment (kEnvironmentNames) in place of the light, the axis that
-/// points up (three), and whether materials' channels are shown.
+/// points up (three), whether materials' channels are shown, and the colour error that may be seen.
 EXPORT(vcp_look) void vcp_look(const double* from) {
     FrameRequest& request = opened.request;
     request.camera.eye = {from[0], from[1], from[2]};
@@ -317,7 +317,7 @@ EXPORT(vcp_look) void vcp_look(const double* from) {
     request.height = uint32_t(from[11]);
     request.errorPixels = from[12];
     request.shading.mode = ShadingMode(int(from[13]));
-    request.colourError = colourErrorIn(request.shading.mode, kUsualColourError);
+    request.colourError = colourErrorIn(request.shading.mode, from[35]);
     request.shading.shadows = from[14] != 0;
     request.shading.occlusionRays = uint32_t(from[15]);
     request.shading.backgroundTop = {from[16], from[17], from[18]};
