@@ -15,6 +15,7 @@ svg line { stroke: #000; stroke-opacity: .55; stroke-width: 4; stroke-linecap: r
 svg line + line { stroke: #ffd24d; stroke-opacity: 1; stroke-width: 2; }
 svg text { fill: #fff; stroke: #000c; stroke-width: 3.5; paint-order: stroke; stroke-linejoin: round; font-weight: 600;
     text-anchor: middle; font-variant-numeric: tabular-nums; }
+svg path { stroke: #ffd24d; stroke-width: 2; }
 svg circle { fill: #ffd24d; stroke: #0009; stroke-width: 1.5; }
 .bar { position: absolute; left: 50%; bottom: max(14px, env(safe-area-inset-bottom)); transform: translateX(-50%);
     display: flex; gap: 4px; padding: 5px; border-radius: 12px; background: var(--raised); border: 1px solid var(--line);
@@ -33,15 +34,16 @@ button:focus-visible, select:focus-visible { outline: 2px solid var(--accent); }
 .scale { position: absolute; left: 16px; bottom: 22px; font-size: 12px; color: var(--ink); pointer-events: none;
     border: 2px solid currentColor; border-top: 0; height: 6px; box-sizing: border-box; text-align: center; }
 .scale span { position: absolute; left: 0; right: 0; bottom: 8px; white-space: nowrap; }
-.note { position: absolute; transform: translate(-50%, -50%); width: 26px; height: 26px; min-width: 0; padding: 0;
+.note { position: absolute; left: 0; top: 0; transform: translate(-50%, -50%); width: 26px; height: 26px; min-width: 0; padding: 0;
     border-radius: 50%; background: var(--accent); color: #fff; font-size: 13px; font-weight: 600; box-shadow: 0 1px 6px #0006; }
+:host([data-theme="dark"]) .note { color: #06192e; }
 .card { position: absolute; right: 14px; top: 12px; width: min(300px, calc(100% - 28px)); box-sizing: border-box;
     padding: 14px 16px; border-radius: 12px; background: var(--raised); border: 1px solid var(--line); }
 .card h2 { margin: 0 0 4px; font-size: 15px; } .card p { margin: 0; color: var(--dim); }
 .panel { position: absolute; left: 50%; bottom: 76px; transform: translateX(-50%); width: min(340px, calc(100% - 28px));
     box-sizing: border-box; padding: 12px 16px; border-radius: 12px; background: var(--raised); border: 1px solid var(--line);
     backdrop-filter: blur(10px); display: grid; grid-template-columns: auto 1fr; gap: 6px 12px; align-items: center; }
-.panel[hidden] { display: none; } .panel .wide { grid-column: 1 / 3; display: flex; gap: 18px; }
+.panel[hidden] { display: none; } .panel .wide { grid-column: 1 / 3; display: flex; justify-content: space-between; gap: 8px; }
 .panel label { display: flex; gap: 7px; align-items: center; min-height: 32px; }
 .panel input { accent-color: var(--accent); } .panel input[type="range"] { width: 100%; height: 32px; margin: 0; }
 .corners { display: block; width: 15px; height: 15px; background:
@@ -51,14 +53,14 @@ button:focus-visible, select:focus-visible { outline: 2px solid var(--accent); }
     linear-gradient(currentColor 0 0) 100% 100% / 6px 2px, linear-gradient(currentColor 0 0) 100% 100% / 2px 6px;
     background-repeat: no-repeat; }
 @container (max-width: 620px) { .scale { bottom: 78px; } .bar button, .bar select { padding: 0 9px; }
-    .panel:not([hidden]) + .scale { display: none; } }
+    .panel:not([hidden]) + .scale { display: none; } .card { top: 52px; } }
 @container (min-width: 1100px) { .panel { left: auto; right: 14px; bottom: 14px; transform: none; } }
 @media (prefers-reduced-motion: reduce) { * { transition: none !important; } }
 `;
 
 export const kMarkup = `
 <canvas tabindex="0" role="application"
-    aria-label="Three-dimensional view. Arrow keys turn, plus and minus zoom, shift and arrow keys move, F fits."></canvas>
+    aria-label="Three-dimensional view. Arrow keys turn, plus and minus zoom, shift and arrow keys move, F fits. M measures: Enter takes the middle of the view. Escape closes what is open."></canvas>
 <svg aria-hidden="true"></svg>
 <div class="notes"></div>
 <div class="status" role="status" aria-live="polite"></div>
@@ -88,4 +90,4 @@ export const kMarkup = `
     <span>Place</span><input type="range" data-set="place" aria-label="Place of the section plane, hundredths" min="0" max="100">
 </div>
 <div class="scale" hidden><span></span></div>
-<div class="card" hidden><h2></h2><p></p></div>`;
+<div class="card" role="note" aria-live="polite" hidden><h2></h2><p></p></div>`;

@@ -68,11 +68,13 @@ export class VcpViewer extends HTMLElement {
         this.number = 0;
         this.points = []; // of the measurement
         this.notes = [];
+        this.notesSeen = null; // the view that they are placed for
         this.problems = {}; // by what has one: page, scan, notes
         this.said = this.loading = '';
         this.picks = new Map();
         this.worker = null;
         this.casters = []; // the workers beside it
+        find('[data-do="full"]').hidden = !document.fullscreenEnabled;
         this.listen();
     }
 
@@ -182,6 +184,8 @@ export class VcpViewer extends HTMLElement {
 
     endWorkers() {
         for (const worker of [this.worker, ...this.casters]) worker?.terminate();
+        for (const done of this.picks.values()) done(null);
+        this.picks.clear();
         this.worker = null;
         this.casters = [];
     }
@@ -229,7 +233,7 @@ export class VcpViewer extends HTMLElement {
             this.startCasters(message.start);
             this.fit();
             const link = /(?:^#|&)vcp=([^&]+)/.exec(location.hash);
-            if (link && this.orbit.fromText(decodeURIComponent(link[1]))) this.look(false);
+            if (link && this.orbit.fromText(link[1].replace(/%2c/gi, ','))) this.look(false);
             this.tell('load', { info: this.info });
         } else if (message.type === 'picture') this.show(message);
         else if (message.type === 'settled') {
@@ -303,6 +307,7 @@ export class VcpViewer extends HTMLElement {
 
     /// Returns what is seen at a place of the element, in CSS pixels: { position, depth, error }, or null.
     pick(x, y) {
+        if (!this.worker) return Promise.resolve(null);
         const key = `${performance.now()} ${Math.random()}`;
         return new Promise(done => {
             this.picks.set(key, done);
@@ -332,6 +337,9 @@ export class VcpViewer extends HTMLElement {
         const width = this.clientWidth, height = this.clientHeight;
         const at = this.points.map(p => this.orbit.project(p.position, width, height));
         let svg = '';
+        // Where Enter measures.
+        if (this.dataset.tool === 'measure' && this.parts.canvas.matches(':focus-visible'))
+            svg += `<path d="M${width / 2 - 9} ${height / 2}h18m-9-9v18"/>`;
         if (at.length === 2 && at[0] && at[1]) {
             const ends = `x1="${at[0].x}" y1="${at[0].y}" x2="${at[1].x}" y2="${at[1].y}"`;
             svg += `<line ${ends}/><line ${ends}/>`;
@@ -341,11 +349,7 @@ export class VcpViewer extends HTMLElement {
         if (at.length === 2 && at[0] && at[1])
             svg += `<text x="${(at[0].x + at[1].x) / 2}" y="${(at[0].y + at[1].y) / 2 - 10}">${this.measured()}</text>`;
         this.parts.lines.innerHTML = svg;
-        this.notes.forEach(note => {
-            const p = this.orbit.project(note.position, width, height);
-            note.button.hidden = !p;
-            if (p) note.button.style.cssText = `left:${p.x}px;top:${p.y}px`;
-        });
+        this.placeNotes(width, height);
         const unit = 2 * this.orbit.distance * Math.tan(kFieldOfView / 2) / Math.max(height, 1);
         const power = 10 ** Math.floor(Math.log10(unit * 130)), step = [5, 2, 1].find(s => s * power <= unit * 130) ?? 1;
         this.parts.scale.hidden = !this.info;
@@ -353,30 +357,47 @@ export class VcpViewer extends HTMLElement {
         this.parts.scale.firstChild.textContent = lengthText(step * power);
     }
 
+    /// Of thousands that is work, so it is done where the view is another one.
+    placeNotes(width, height) {
+        const seen = `${this.camera} ${width} ${height}`;
+        if (seen === this.notesSeen) return;
+        this.notesSeen = seen;
+        for (const { position, button } of this.notes) {
+            const p = this.orbit.project(position, width, height);
+            button.hidden = !(p && p.x >= 0 && p.x <= width && p.y >= 0 && p.y <= height);
+            if (!button.hidden) button.style.translate = `${p.x}px ${p.y}px`;
+        }
+    }
+
     async readNotes() {
-        const file = this.getAttribute('annotations');
+        const file = this.getAttribute('annotations'), reading = this.reading = {};
         this.parts.notes.replaceChildren();
+        this.parts.card.hidden = true;
         this.notes = [];
         delete this.problems.notes;
         this.showStatus();
         if (!file) return;
         try {
-            const read = await (await fetch(new URL(file, document.baseURI))).json();
+            const answer = await fetch(new URL(file, document.baseURI));
+            if (!answer.ok) throw new Error(`the server answers ${answer.status}`);
+            const read = await answer.json();
+            if (reading !== this.reading) return; // another file is being read
             if (!Array.isArray(read)) throw new Error('an array of { position, title, text } is expected');
-            read.forEach((note, i) => {
-                if (!Array.isArray(note.position) || note.position.length !== 3 || !note.position.every(Number.isFinite))
+            this.notes = read.map((note, i) => {
+                if (!Array.isArray(note?.position) || note.position.length !== 3 || !note.position.every(Number.isFinite))
                     throw new Error(`annotation ${i + 1} has no position of three numbers`);
                 const button = document.createElement('button');
                 button.className = 'note';
                 button.textContent = String(i + 1);
                 button.setAttribute('aria-label', String(note.title ?? `Annotation ${i + 1}`));
                 button.onclick = () => this.showNote(note);
-                this.parts.notes.append(button);
-                this.notes.push({ ...note, button });
+                return { position: note.position, button };
             });
+            this.parts.notes.append(...this.notes.map(note => note.button));
+            this.notesSeen = null;
             this.drawOver();
         } catch (error) {
-            this.fail('notes', `${file}: ${error.message}`);
+            if (reading === this.reading) this.fail('notes', `${file}: ${error.message}`);
         }
     }
     showNote(note) {
@@ -452,6 +473,7 @@ export class VcpViewer extends HTMLElement {
             else if (event.key === '-') this.orbit.zoom(1.25, 0, 0);
             else if (event.key === 'f' || event.key === 'F') return this.fit();
             else if (event.key === 'm' || event.key === 'M') return this.toggleMeasuring();
+            else if (event.key === 'Enter' && this.dataset.tool === 'measure') return void this.measureAt(this.clientWidth / 2, this.clientHeight / 2);
             else return;
             event.preventDefault();
             this.moved();
@@ -461,15 +483,26 @@ export class VcpViewer extends HTMLElement {
             const what = event.target.closest('button')?.dataset.do;
             if (what === 'fit') this.fit();
             if (what === 'measure') this.toggleMeasuring();
-            if (what === 'more') this.togglePanel(event.target.closest('button'));
+            if (what === 'more') this.togglePanel();
             if (what === 'link') this.copyLink();
-            if (what === 'full') document.fullscreenElement ? document.exitFullscreen() : this.requestFullscreen();
+            if (what === 'full') (document.fullscreenElement ? document.exitFullscreen() : this.requestFullscreen()).catch(() => {});
         };
         this.parts.panel.oninput = event => this.changed(event.target);
+        canvas.onfocus = canvas.onblur = () => this.drawOver();
+        this.shadowRoot.addEventListener('keydown', event => {
+            if (event.key === 'Escape') this.closeAll();
+        });
     }
 
-    togglePanel(button) {
-        const { panel } = this.parts;
+    /// Closes what lies over the picture.
+    closeAll() {
+        if (!this.parts.panel.hidden) this.togglePanel();
+        if (!this.parts.card.hidden) this.showNote(this.shownNote);
+        if (this.dataset.tool === 'measure') this.toggleMeasuring();
+    }
+
+    togglePanel() {
+        const { panel, bar } = this.parts, button = bar.querySelector('[data-do="more"]');
         panel.hidden = !panel.hidden;
         button.setAttribute('aria-pressed', String(!panel.hidden));
         button.setAttribute('aria-expanded', String(!panel.hidden));

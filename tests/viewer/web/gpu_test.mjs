@@ -1,14 +1,15 @@
-// Pictures of WebGL beside those of the processor, in a headless Chromium with SwiftShader: gpu_test.mjs FOLDER PICTURES
-// [rays]. FOLDER: as `vcp publish` makes it, with any scans scan*.vcp and, for the page, plain.vcp. rays: a million rays a
+// Pictures of WebGL beside those of the processor: gpu_test.mjs chromium|firefox FOLDER PICTURES [rays]. Headless Chromium
+// has SwiftShader, and Firefox Mesa's llvmpipe where there is a display, as `xvfb-run -a` makes one. FOLDER: as `vcp publish` makes it, with any scans scan*.vcp and, for the page, plain.vcp. rays: a million rays a
 // view, also with a section, and no page.
 import assert from 'node:assert/strict';
 import fs from 'node:fs';
 import http from 'node:http';
 import path from 'node:path';
 import { Browser } from './browser.mjs';
+import { Firefox } from './firefox.mjs';
 import { compareColours, compareDepth } from './native_picture.mjs';
 
-const [folder, pictures, kind] = process.argv.slice(2);
+const [browserName, folder, pictures, kind] = process.argv.slice(2);
 const kSize = kind === 'rays' ? [1000, 1000] : [320, 200];
 const kTypes = { '.html': 'text/html', '.js': 'text/javascript', '.wasm': 'application/wasm' };
 const server = http.createServer((request, answer) => {
@@ -23,7 +24,7 @@ const server = http.createServer((request, answer) => {
 await new Promise(done => server.once('listening', done));
 const address = `http://127.0.0.1:${server.address().port}/`;
 
-const browser = new Browser(path.join(pictures, 'profile'), { gpu: true });
+const profile = path.join(pictures, 'profile'), browser = browserName === 'firefox' ? new Firefox(profile) : new Browser(profile, { gpu: true });
 process.on('exit', () => browser.process.kill('SIGKILL'));
 const page = await browser.page(320, 200, false);
 
@@ -142,7 +143,7 @@ async function compare(file, views, tolerance) {
     });
 }
 
-await page.call('Page.navigate', { url: address });
+await page.go(address);
 await page.until('document.readyState === "complete"');
 await page.evaluate(`document.body.replaceChildren(); (async () => { ${kHarness} })().catch(error => { window.harnessError = error.stack; })`);
 await page.until('Boolean(window.isThere || window.harnessError)');
@@ -161,7 +162,7 @@ for (const file of fs.readdirSync(folder).filter(name => /^scan.*\.vcp$/.test(na
         assert.ok(hits > 3000 && differ <= hits / 1000 && holes <= 2);
         assert.ok(colours.differ <= colours.counted / 1000);
     }
-assert.deepEqual(page.errors, []);
+assert.deepEqual(await page.complaints(), []);
 
 /// The page draws by WebGL once it can, and by the processor where WebGL's context is lost, or the browser's own process
 /// for graphics.
@@ -172,7 +173,7 @@ async function loses() {
         addEventListener('error', event => { if (event.detail?.message) window.problem = event.detail.message; });</script>
         <vcp-viewer src="plain.vcp" draw="webgl" workers="1"></vcp-viewer>`);
     const page = await browser.page(...kSize, false), isGpus = `window.seen?.at(-1)?.drawnBy === 'webgl' && seen.at(-1).samples === 8`;
-    await page.call('Page.navigate', { url: `${address}webgl.html` });
+    await page.go(`${address}webgl.html`);
     await page.until(isGpus, 300e3);
     assert.equal(await page.evaluate('seen[0].drawnBy'), 'processor', 'nobody waits for WebGL');
     const shown = async () => new Uint8ClampedArray(unpacked(await page.evaluate(`(() => {
@@ -182,7 +183,8 @@ async function loses() {
     })()`)));
     const before = await shown();
     assert.equal(before.length, 4 * kSize[0] * kSize[1]);
-    for (const lose of [() => page.loseContexts(), () => browser.call('Browser.crashGpuProcess').catch(() => {})]) {
+    const losses = browserName === 'firefox' ? [] : [() => page.loseContexts(), () => browser.call('Browser.crashGpuProcess').catch(() => {})];
+    for (const lose of losses) {
         await page.evaluate('seen = []');
         await Promise.race([lose(), new Promise(done => setTimeout(done, 2000))]);
         await page.evaluate(`document.querySelector('vcp-viewer').fit()`);
@@ -197,7 +199,7 @@ async function loses() {
         assert.ok(differ <= before.length / 4000, `${differ} pixels differ once the processor draws again`);
     }
     assert.equal(await page.evaluate('window.problem ?? null'), null);
-    assert.deepEqual(page.errors, []);
+    assert.deepEqual(await page.complaints(), []);
 }
 if (kind !== 'rays') await loses();
 await browser.close();

@@ -21,4 +21,4 @@ cd "$folder"
 "$vcp" publish scan.vcp -o site --viewer "$web" >/dev/null
 "$make_scan" --triangles 10000 -o plain.ply
 "$vcp" build plain.ply -o site/plain.vcp --progress none
-"$node" "$here/gpu_test.mjs" site pictures
+"$node" "$here/gpu_test.mjs" chromium site pictures
