@@ -6,6 +6,7 @@ import assert from 'node:assert/strict';
 import { execFileSync, spawn } from 'node:child_process';
 import fs from 'node:fs';
 import http from 'node:http';
+import net from 'node:net';
 import path from 'node:path';
 import { pathToFileURL } from 'node:url';
 import zlib from 'node:zlib';
@@ -380,6 +381,42 @@ async function moves() {
     assert.deepEqual(await moved(), { target: true, distance: true, turned: false }, 'the wheel zooms to the cursor');
     await page.key('f');
     assert.deepEqual(await moved(), { target: true, distance: true, turned: false });
+    // Who has no mouse measures from the middle, and closes with Escape.
+    await change(page, '');
+    await page.key('m');
+    await page.key('Enter');
+    await page.until('state.picks.length === 1');
+    await change(page, 'viewer.orbit.turn(20, 0, 200); viewer.look(false)');
+    await page.key('Enter');
+    await page.until('state.picks.length === 2');
+    assert.match(await status(page), /^[0-9.]+ ± [0-9.]+$/);
+    await page.key('Escape');
+    assert.deepEqual(await page.evaluate(`[viewer.dataset.tool, part('svg').childElementCount]`), ['', 0]);
+    await closeGood(page);
+}
+
+/// An element that is taken out and put back, and a link that leads nowhere, show the scan.
+async function persists() {
+    for (const link of ['#vcp=%E0%A4%A', '#vcp=NaN,0,0,1,0,0', '#vcp=0,0,0,-1,0,0', '#vcp=<svg onload=1>']) {
+        const page = await open(160, 100, { link: `?${link.length}${link}` });
+        const fitted = await page.evaluate('viewer.camera');
+        await page.evaluate('viewer.fit()');
+        assert.equal(await page.evaluate('viewer.camera'), fitted, link);
+        await change(page, '');
+        await closeGood(page);
+    }
+    const page = await open(160, 100), before = await shown(page);
+    await change(page, `(async () => {
+        for (let i = 0; i < 20; ++i) {
+            const hit = viewer.pick(80, 50);
+            viewer.remove();
+            await hit; // a question that nobody answers any more
+            document.body.append(viewer);
+            await new Promise(done => setTimeout(done, 20 * (i % 6)));
+        }
+        state.settled = null;
+    })()`);
+    assert.equal(await shown(page), before);
     await closeGood(page);
 }
 
@@ -393,6 +430,9 @@ async function annotates() {
     assert.deepEqual(await page.evaluate(`[part('.card').hidden, part('.card h2').textContent, part('.card p').textContent,
         part('.card b') === null]`), [false, 'Here', '<b>plain</b>', true], 'a text is no markup');
     await page.picture(path.join(pictures, 'note.png'));
+    await page.evaluate(`part('.note').focus()`);
+    await page.key('Escape');
+    assert.equal(await page.evaluate(`part('.card').hidden`), true);
     await page.evaluate(given('[{ "position": [0, 1] }]'));
     await page.until('state.problem');
     assert.match(await status(page), /annotation 1 has no position of three numbers/);
@@ -526,6 +566,45 @@ async function serves() {
     server.kill('SIGINT');
 }
 
+/// nginx, told to compress everything: the viewer comes compressed, and ranges of the scan as they are.
+async function servesCompressed() {
+    const nginx = ['/usr/sbin/nginx', '/usr/bin/nginx'].find(fs.existsSync);
+    if (!nginx) return console.log('nginx is missing: left out');
+    const port = await new Promise(done => {
+        const free = net.createServer().listen(0, '127.0.0.1', () => {
+            const { port } = free.address();
+            free.close(() => done(port));
+        });
+    });
+    const work = path.resolve(pictures, 'nginx'), file = path.join(work, 'nginx.conf'), types = Object.entries(kTypes);
+    fs.mkdirSync(work, { recursive: true });
+    fs.writeFileSync(file, `daemon off; pid ${work}/pid; ${process.getuid() === 0 ? 'user root;' : ''}
+        events {}
+        http {
+            access_log ${work}/access.log;
+            ${['client_body', 'proxy', 'fastcgi', 'uwsgi', 'scgi'].map(name => `${name}_temp_path ${work}/${name};`).join(' ')}
+            types { ${types.map(([ending, type]) => `${type} ${ending.slice(1)};`).join(' ')} }
+            gzip on; gzip_types *; gzip_min_length 1;
+            server { listen 127.0.0.1:${port}; root ${path.resolve(folder)}; }
+        }`);
+    const server = spawn(nginx, ['-p', work, '-e', path.join(work, 'error.log'), '-c', file], { stdio: 'inherit' });
+    const site = `http://127.0.0.1:${port}/`;
+    for (const end = Date.now() + 30e3; !await fetch(site).then(() => true, () => false); await new Promise(done => setTimeout(done, 50)))
+        assert.ok(Date.now() < end, 'nginx does not start');
+    const seen = [];
+    for (const one of [site, address]) {
+        const page = await open(320, 200, { site: one });
+        seen.push(await shown(page));
+        const sizes = await page.evaluate(`performance.getEntriesByType('resource').map(({ name, encodedBodySize, decodedBodySize }) => [name, encodedBodySize, decodedBodySize])`);
+        const [, sent, whole] = sizes.find(([name]) => name.endsWith('vcp-viewer.js'));
+        assert.equal(sent < whole, one === site);
+        assert.equal(await page.evaluate('state.problem ?? null'), null);
+        await page.close();
+    }
+    assert.equal(seen[0], seen[1]);
+    server.kill('SIGQUIT');
+}
+
 /// Runs a step and says how long it took.
 async function step(run, ...all) {
     const began = performance.now();
@@ -537,7 +616,7 @@ if (kind === 'short') {
     await step(looks, 390, 844, true);
     await step(measures, 'whole', 320, 200);
     await step(shares, false);
-    for (const run of [moves, returns]) await step(run);
+    for (const run of [moves, persists, returns]) await step(run);
 } else if (kind === 'shards') {
     await step(showsShards);
 } else if (kind === 'images') {
@@ -555,7 +634,7 @@ if (kind === 'short') {
     if (scan.length > kLead) {
         for (const name of Object.keys(kCameras)) await step(measures, name, 320, 200);
         await step(shares, true);
-        for (const run of [moves, annotates, returns, crosses, serves]) await step(run);
+        for (const run of [moves, persists, annotates, returns, crosses, serves, servesCompressed]) await step(run);
     }
 }
 await browser.close();
