@@ -51,6 +51,7 @@ function fetchMissing() {
     const underWay = [...asked], missing = without(module.missing(), underWay);
     let bytesAsked = underWay.reduce((sum, run) => sum + run.bytes, 0);
     const [mostRequests, mostBytes] = hasShown ? [kAtOnce, kBytesAtOnce] : [kAtFirst, kBytesAtFirst];
+    if (!hasShown && asked.size > 0) return;
     for (const run of urgentFirst(joined(missing, kGap, kMostBytes), missing)) {
         // What is joined may have something between that is under way, or was fetched before.
         const there = [...underWay, ...without(fetched.filter(one => overlap(one, run)), missing)];

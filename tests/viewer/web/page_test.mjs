@@ -616,7 +616,7 @@ if (kind === 'short') {
     await step(looks, 390, 844, true);
     await step(measures, 'whole', 320, 200);
     await step(shares, false);
-    for (const run of [moves, persists, returns]) await step(run);
+    for (const run of [moves, persists]) await step(run);
 } else if (kind === 'shards') {
     await step(showsShards);
 } else if (kind === 'images') {
