@@ -9,7 +9,7 @@ const kLead = 64 << 10;      // bytes of the first request: header, directory an
 const kGap = 32 << 10;       // pages, and pieces of images, so near each other are fetched in one request
 const kMostBytes = 256 << 10; // of one request
 const kAtOnce = 12, kBytesAtOnce = 1 << 20; // requests, and bytes that they ask for
-const kAtFirst = 2, kBytesAtFirst = kMostBytes; // until there is a picture, which comes sooner where nothing else does
+const kAtFirst = 1;          // request, until there is a picture: it comes sooner where nothing else does
 const kFrameMs = 16; // between frames that nothing else asks for
 const kSamples = 8;          // of a pixel, where a view is at rest
 
@@ -50,14 +50,12 @@ async function open({ url, wasm, budgetBytes, draw }) {
 function fetchMissing() {
     const underWay = [...asked], missing = without(module.missing(), underWay);
     let bytesAsked = underWay.reduce((sum, run) => sum + run.bytes, 0);
-    const [mostRequests, mostBytes] = hasShown ? [kAtOnce, kBytesAtOnce] : [kAtFirst, kBytesAtFirst];
-    if (!hasShown && asked.size > 0) return;
     for (const run of urgentFirst(joined(missing, kGap, kMostBytes), missing)) {
         // What is joined may have something between that is under way, or was fetched before.
         const there = [...underWay, ...without(fetched.filter(one => overlap(one, run)), missing)];
         for (const part of without([run], there)) {
             const [wanted] = joined(missing.filter(one => overlap(one, part)), Infinity, Infinity);
-            if (asked.size >= mostRequests || bytesAsked >= mostBytes) return;
+            if (asked.size >= (hasShown ? kAtOnce : kAtFirst) || bytesAsked >= kBytesAtOnce) return;
             if (!wanted) continue;
             bytesAsked += wanted.bytes;
             fetchPart(wanted);
