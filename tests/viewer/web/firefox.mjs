@@ -35,7 +35,7 @@ export class Firefox {
 
     async connect() {
         const file = path.join(this.profile, 'MarionetteActivePort'), port = () => Number(fs.existsSync(file) && fs.readFileSync(file, 'utf8'));
-        for (const end = Date.now() + 120e3; !port(); await new Promise(done => setTimeout(done, 50)))
+        for (const end = Date.now() + 300e3; !port(); await new Promise(done => setTimeout(done, 50)))
             if (this.hasEnded || Date.now() > end) throw new Error('Firefox does not start');
         this.socket = net.connect(port(), '127.0.0.1');
         let bytes = Buffer.alloc(0);

@@ -3,21 +3,18 @@
 # Chromium does everything; Firefox what browsers may do otherwise.
 set -euo pipefail
 browser=$1 node=$2 web=$3 vcp=$4 make_scan=$5 folder=$6
-case $browser in
-    chromium) start=(chromium --headless=new --no-sandbox --disable-gpu --disable-dev-shm-usage --dump-dom) ;;
-    firefox) start=(firefox-esr --headless --no-remote --profile "$folder/profile" --screenshot "$folder/blank.png") ;;
-esac
-if [ ! -e "$web/vcp.wasm" ] || ! command -v "${start[0]}" >/dev/null; then
+if [ ! -e "$web/vcp.wasm" ] || ! command -v "${browser/firefox/firefox-esr}" >/dev/null; then
     echo "The target web was not built, or there is no $browser: skipped"
     exit 77
 fi
-rm -rf "$folder"
-mkdir -p "$folder/profile"
-if ! timeout 120 "${start[@]}" about:blank >/dev/null 2>&1; then
-    echo "$browser does not start here: skipped"
+if [ "$browser" = chromium ] && ! timeout 120 chromium --headless=new --no-sandbox --disable-gpu --disable-dev-shm-usage \
+    --dump-dom about:blank >/dev/null 2>&1; then
+    echo "Chromium does not start here: skipped"
     exit 77
 fi
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
+rm -rf "$folder"
+mkdir -p "$folder"
 cd "$folder"
 # page TRIANGLES KIND: the page of a scan.
 page() {
