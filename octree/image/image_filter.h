@@ -63,7 +63,11 @@ inline bool findTexels(const ImageSet::Level& level, ImageWraps wraps, glm::ivec
     if (first == nullptr) return false;
     if (columns[0] >> level.log2Edge == columns[1] >> level.log2Edge &&
         rows[0] >> level.log2Edge == rows[1] >> level.log2Edge) [[likely]] {
-        for (int i = 0; i < 4; ++i) quad.texels[i] = first[level.placeInTile(columns[i & 1], rows[i >> 1])];
+        const auto right = std::ptrdiff_t(columns[1]) - std::ptrdiff_t(columns[0]);
+        const uint32_t* const texel = first + level.placeInTile(columns[0], rows[0]);
+        const uint32_t* const below = first + level.placeInTile(columns[0], rows[1]);
+        quad.texels[0] = texel[0], quad.texels[1] = texel[right];
+        quad.texels[2] = below[0], quad.texels[3] = below[right];
         return true;
     }
     for (int i = 0; i < 4; ++i) {

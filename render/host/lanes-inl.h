@@ -42,6 +42,7 @@ HWY_INLINE Lane operator-(Lane a, Lane b) { return hn::Sub(a.v, b.v); }
 HWY_INLINE Lane operator-(Lane a) { return hn::Neg(a.v); }
 HWY_INLINE Lane operator*(Lane a, Lane b) { return hn::Mul(a.v, b.v); }
 HWY_INLINE Lane operator/(Lane a, Lane b) { return hn::Div(a.v, b.v); }
+HWY_INLINE Mask operator==(Lane a, Lane b) { return hn::Eq(a.v, b.v); }
 HWY_INLINE Mask operator<(Lane a, Lane b) { return hn::Lt(a.v, b.v); }
 HWY_INLINE Mask operator<=(Lane a, Lane b) { return hn::Le(a.v, b.v); }
 HWY_INLINE Mask operator>(Lane a, Lane b) { return hn::Gt(a.v, b.v); }
