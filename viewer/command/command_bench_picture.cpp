@@ -6,6 +6,7 @@
 #include "render/pixel_samples.h"
 #include "viewer/bench/picture/bench_colour.h"
 #include "viewer/bench/picture/bench_picture.h"
+#include "viewer/bench/rays/bench_cameras.h"
 #include "viewer/command/bench_command.h"
 #include "viewer/command/parsed_option.h"
 #include "viewer/scene/option_values.h"
@@ -102,7 +103,10 @@ RunCommand addBenchColour(CLI::App& bench) {
                     "Meshes with colours or textures, or .vcp files beside the meshes they were built from [a wall and "
                     "waves with a texture]");
     addNames(*app, "--methods", options.methods, fmt::format("{} [all]", fmt::join(colourMethodNames(), ", ")));
-    addNames(*app, "--cameras", options.cameras, fmt::format("{} [all]", fmt::join(colourCameraNames(), ", ")));
+    addNames(*app, "--cameras", options.cameras,
+             fmt::format("{} [whole, half, close]; dive goes from whole to a cell of {:g} pixels",
+                         fmt::join(colourCameraNames(), ", "), kDiveCellPixels));
+    addNumber(*app, "--dive-steps", options.diveSteps, "Frames of the dive", 1000);
     addPictureOptions(*app, options, command->size);
     app->add_option("--colour-error", options.colourErrors,
                     "Differences of colours that a picture may have, as \u0394E: 1,2,4")

@@ -23,6 +23,9 @@ namespace {
 /// A pixel is within a silhouette where all its rays meet the mesh, and images cut out less than half of it.
 constexpr float kLeastOpacity = 0.5f;
 
+/// Decoded texels that an image of the mesh may have, as bytes: those of the largest that is built.
+constexpr uint64_t kMostImageBytes = uint64_t{4} << 30;
+
 struct DrawnColours {
     SurfaceColours picture;
     PictureCost cost;
@@ -38,6 +41,11 @@ public:
     /// Forgets what was read.
     virtual Result<void> startAnew() { return {}; }
     virtual Result<DrawnColours> draw(const FrameRequest& request) = 0;
+    /// Returns the picture with what is in memory, before what it lacks is read; nothing of a method that reads
+    /// nothing.
+    virtual Result<std::optional<SurfaceColours>> drawUnread(const FrameRequest&) {
+        return std::optional<SurfaceColours>();
+    }
     uint64_t geometryBytes = 0, colourBytes = 0;
 };
 
@@ -52,18 +60,28 @@ public:
     Result<DrawnColours> draw(const FrameRequest& request) override {
         DrawnColours drawn;
         VCP_TRY_ASSIGN(drawn.cost, drawing_->draw(request));
-        VCP_TRY_ASSIGN(const auto picture, drawing_->renderer().readPicture());
-        VCP_TRY_ASSIGN(const auto depth, drawing_->renderer().readDepth());
-        drawn.picture = SurfaceColours({int(picture.width), int(picture.height)});
-        for (size_t i = 0; i < depth.size(); ++i) {
-            for (int channel = 0; channel < 3; ++channel)
-                drawn.picture.light[i][channel] = lightOfByte()[picture.rgba[4 * i + size_t(channel)]];
-            drawn.picture.coverage[i] = drawn.picture.opacity[i] = std::isfinite(depth[i]) ? 1.0f : 0.0f;
-        }
+        VCP_TRY_ASSIGN(drawn.picture, drawnPicture());
         return drawn;
+    }
+    Result<std::optional<SurfaceColours>> drawUnread(const FrameRequest& request) override {
+        VCP_TRY(drawing_->drawUnread(request));
+        VCP_TRY_ASSIGN(auto picture, drawnPicture());
+        return std::optional(std::move(picture));
     }
 
 private:
+    [[nodiscard]] Result<SurfaceColours> drawnPicture() const {
+        VCP_TRY_ASSIGN(const auto picture, drawing_->renderer().readPicture());
+        VCP_TRY_ASSIGN(const auto depth, drawing_->renderer().readDepth());
+        SurfaceColours colours({int(picture.width), int(picture.height)});
+        for (size_t i = 0; i < depth.size(); ++i) {
+            for (int channel = 0; channel < 3; ++channel)
+                colours.light[i][channel] = lightOfByte()[picture.rgba[4 * i + size_t(channel)]];
+            colours.coverage[i] = colours.opacity[i] = std::isfinite(depth[i]) ? 1.0f : 0.0f;
+        }
+        return colours;
+    }
+
     std::unique_ptr<SettledDrawing> drawing_;
 };
 
@@ -118,11 +136,19 @@ bool isCovered(const SurfaceColours& picture, size_t pixel) {
     return picture.coverage[pixel] == 1 && picture.opacity[pixel] >= kLeastOpacity;
 }
 
-/// A row and the differences that its quantiles are of.
+double meanOf(const std::vector<float>& values) {
+    double sum = 0;
+    for (const float value : values) sum += double(value);
+    return values.empty() ? 0 : sum / double(values.size());
+}
+
+/// A row and the differences that its means and quantiles are of.
 struct RowSum {
     BenchColourRow row;
     std::vector<float> differences;
     double flip = 0;
+    bool isStep = false;  ///< after a dive's first
+    std::vector<float> pops, changes, meshChanges;
 };
 
 /// Compares the pixels that both pictures cover.
@@ -137,6 +163,26 @@ void compare(const SurfaceColours& reference, SurfaceColours picture, RowSum& su
     for (const size_t i : compared) {
         sum.differences.push_back(float(colourDifference(reference.light[i], picture.light[i])));
         sum.flip += flips[i];
+    }
+}
+
+/// What a step of a dive, or the one before, shows.
+struct Step {
+    SurfaceColours mesh;
+    std::vector<SurfaceColours> pictures;  ///< of each method
+};
+
+/// Adds how the pixels that are covered throughout changed since the step before. `unread`: the step with what was in
+/// memory.
+void addChanges(const Step& before, const SurfaceColours& pictureBefore, const SurfaceColours& unread,
+                const SurfaceColours& mesh, const SurfaceColours& picture, RowSum& sum) {
+    sum.isStep = true;
+    for (size_t i = 0; i < mesh.light.size(); ++i) {
+        if (!isCovered(before.mesh, i) || !isCovered(mesh, i)) continue;
+        if (pictureBefore.coverage[i] < 1 || unread.coverage[i] < 1 || picture.coverage[i] < 1) continue;
+        sum.pops.push_back(float(colourDifference(unread.light[i], picture.light[i])));
+        sum.changes.push_back(float(colourDifference(pictureBefore.light[i], picture.light[i])));
+        sum.meshChanges.push_back(float(colourDifference(before.mesh.light[i], mesh.light[i])));
     }
 }
 
@@ -177,7 +223,7 @@ private:
             return Error{.code = ErrorCode::Usage,
                          .message = "has no colour to compare; name a mesh with colours or textures",
                          .file = model->files.mesh.string()};
-        paint.loadImages();
+        paint.loadImages({.bytes = kMostImageBytes});
         report_.warnings.insert(report_.warnings.end(), paint.warnings().begin(), paint.warnings().end());
         VCP_TRY_ASSIGN(const auto mesh, MeshColourPicture::create(model->mesh, o_.threads));
         const MeshColourPicture::Paint textured = [&](uint64_t triangle, glm::dvec3 weights) {
@@ -237,29 +283,61 @@ private:
         return {};
     }
 
+    /// Returns a camera, or the steps of a dive.
+    [[nodiscard]] std::vector<Camera> camerasOf(const BenchModel& model, const std::string& name, int view) const {
+        const FileHeader& header = model.cache->dataset().header;
+        const CellGrid grid{{header.origin[0], header.origin[1], header.origin[2]}, header.cell};
+        if (name == "dive") return diveCameras(*model.bvh, grid, o_.size, o_.diveSteps, view, o_.views);
+        return {*benchCamera(name, *model.bvh, grid, o_.size, view, o_.views)};
+    }
+
     /// Draws a camera's views with all methods: one after the other, so that the mesh's pictures are drawn once.
     Result<void> runCamera(const BenchModel& model, const MeshColourPicture& mesh,
                            const MeshColourPicture::Paint& textured, const Methods& methods, const std::string& name) {
-        const FileHeader& header = model.cache->dataset().header;
-        const CellGrid grid{{header.origin[0], header.origin[1], header.origin[2]}, header.cell};
-        std::vector<RowSum> sums(methods.size());
+        std::vector<RowSum> sums;
+        std::vector<Camera> first;
         for (int view = 0; view < o_.views; ++view) {
-            const FrameRequest request =
-                colourRequest(*benchCamera(name, *model.bvh, grid, o_.size, view, o_.views), o_.size);
-            VCP_TRY(report(fmt::format("{}: {}, the mesh", model.files.name, name)));
-            const SurfaceColours reference = mesh.draw(request, o_.samples, textured);
-            VCP_TRY(keepPicture(model, name, view, "mesh", reference));
-            for (size_t k = 0; k < methods.size(); ++k) {
-                ColourMethod& method = *methods[k];
-                VCP_TRY(report(fmt::format("{}: {}, {} {}", model.files.name, name, method.name(), method.knob())));
-                VCP_TRY(method.startAnew());
-                VCP_TRY_ASSIGN(const auto drawn, method.draw(request));
-                addCost(sums[k].row, method, drawn);
-                VCP_TRY(keepPicture(model, name, view, method.name() + " " + method.knob(), drawn.picture));
-                compare(reference, drawn.picture, sums[k]);
+            const std::vector<Camera> cameras = camerasOf(model, name, view);
+            if (view == 0) first = cameras;
+            sums.resize(cameras.size() * methods.size());
+            for (const auto& method : methods) VCP_TRY(method->startAnew());
+            Step before;
+            for (size_t step = 0; step < cameras.size(); ++step) {
+                const std::string named = name == "dive" ? fmt::format("dive-{}", step + 1) : name;
+                const FrameRequest request = colourRequest(cameras[step], o_.size);
+                VCP_TRY(report(fmt::format("{}: {}, the mesh", model.files.name, named)));
+                Step now{mesh.draw(request, o_.samples, textured), {}};
+                VCP_TRY(keepPicture(model, named, view, "mesh", now.mesh));
+                for (size_t k = 0; k < methods.size(); ++k) {
+                    VCP_TRY(report(
+                        fmt::format("{}: {}, {} {}", model.files.name, named, methods[k]->name(), methods[k]->knob())));
+                    RowSum& sum = sums[step * methods.size() + k];
+                    sum.row.camera = named;
+                    VCP_TRY(drawStep(*methods[k], request, before, now, sum));
+                    VCP_TRY(keepPicture(model, named, view, methods[k]->name() + " " + methods[k]->knob(),
+                                        now.pictures[k]));
+                }
+                before = std::move(now);
             }
         }
-        for (size_t k = 0; k < methods.size(); ++k) report_.rows.push_back(finishedRow(sums[k], model, name, grid));
+        for (size_t i = 0; i < sums.size(); ++i)
+            report_.rows.push_back(finishedRow(sums[i], model, first[i / methods.size()]));
+        return {};
+    }
+
+    /// Draws a picture with the next method, and adds it to `now` and to its row. `before`: the step before, if any.
+    Result<void> drawStep(ColourMethod& method, const FrameRequest& request, const Step& before, Step& now,
+                          RowSum& sum) const {
+        const size_t number = now.pictures.size();
+        std::optional<SurfaceColours> unread;
+        if (!before.pictures.empty()) {
+            VCP_TRY_ASSIGN(unread, method.drawUnread(request));
+        }
+        VCP_TRY_ASSIGN(auto drawn, method.draw(request));
+        addCost(sum.row, method, drawn);
+        compare(now.mesh, drawn.picture, sum);
+        if (unread) addChanges(before, before.pictures[number], *unread, now.mesh, drawn.picture, sum);
+        now.pictures.push_back(std::move(drawn.picture));
         return {};
     }
 
@@ -277,19 +355,21 @@ private:
         row.finestLevel = std::max(row.finestLevel, drawn.cost.finestLevel);
     }
 
-    [[nodiscard]] BenchColourRow finishedRow(RowSum& sum, const BenchModel& model, const std::string& camera,
-                                             const CellGrid& grid) const {
+    /// `camera`: of the first view.
+    [[nodiscard]] BenchColourRow finishedRow(RowSum& sum, const BenchModel& model, const Camera& camera) const {
         BenchColourRow row = sum.row;
         row.model = model.files.name;
-        row.camera = camera;
         row.comparedPixels = sum.differences.size();
-        const Camera seen = *benchCamera(camera, *model.bvh, grid, o_.size, 0, o_.views);
-        const auto middle = model.bvh->nearestHit(seen.eye, seen.forward);
-        row.cellPixels = middle ? grid.cell * o_.size.y / (2 * std::tan(seen.verticalFov / 2)) / middle->t : 0;
+        const auto middle = model.bvh->nearestHit(camera.eye, camera.forward);
+        row.cellPixels =
+            middle ? model.cache->dataset().header.cell * o_.size.y / (2 * std::tan(camera.verticalFov / 2)) / middle->t
+                   : 0;
+        if (sum.isStep) {
+            row.dive = DiveChange{meanOf(sum.pops), {}, meanOf(sum.changes), meanOf(sum.meshChanges)};
+            if (!sum.pops.empty()) row.dive->pop = quantilesOf(std::move(sum.pops));
+        }
         if (sum.differences.empty()) return row;
-        double all = 0;
-        for (const float difference : sum.differences) all += double(difference);
-        row.differenceMean = all / double(sum.differences.size());
+        row.differenceMean = meanOf(sum.differences);
         row.flipMean = sum.flip / double(sum.differences.size());
         row.difference = quantilesOf(std::move(sum.differences));
         return row;
@@ -317,7 +397,7 @@ private:
 }  // namespace
 
 const std::vector<std::string>& colourCameraNames() {
-    static const std::vector<std::string> names = {"whole", "half", "close"};
+    static const std::vector<std::string> names = {"whole", "half", "close", "dive"};
     return names;
 }
 

@@ -1,6 +1,5 @@
 // vcp bench colour: the surface's colours that are drawn, without light, against those of the textured mesh itself, 64
-// samples a pixel, beside what they cost (docs/measuring.md). Cameras: `whole`, `half` and `close` of bench_cameras.h.
-//
+// XX//
 // Methods: `certified`, the renderer, with the pixel error as its knob; `vertex`, the mesh with a colour at each
 // vertex; `texture`, the textured mesh with as many samples a pixel as `certified` has: the least that any picture of
 // so many samples differs by.
@@ -9,6 +8,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -30,6 +30,7 @@ struct BenchColourOptions {
     std::vector<double> colourErrors = {kUsualColourError};  ///< with each of these
     int pictureSamples = 4;  ///< pictures have so many rays a pixel squared, and so has the mesh of the rivals
     glm::ivec2 size{960, 600};
+    int diveSteps = 64;
     int views = 1;        ///< directions each camera looks from, spread over the sphere; a row counts them all
     int samples = 8;      ///< the mesh's picture has samples x samples rays a pixel
     int repetitions = 3;  ///< frames whose median processor time is reported
@@ -41,6 +42,16 @@ struct BenchColourOptions {
     bool pictures = false;      ///< also writes the pictures into `out`
     /// Called from one thread at a time with what is being done; false cancels. May be empty.
     std::function<bool(const std::string&, double fraction)> progress;
+};
+
+/// What changes from one step of a dive to the next, as colour_difference.h has it, over the pixels within silhouettes,
+/// all views together.
+struct DiveChange {
+    /// From the step's picture with what the steps before it had in memory to the one with all that it wants.
+    double popMean = 0;
+    Quantiles pop;
+    double changeMean = 0;      ///< from the picture of the step before to this one
+    double meshChangeMean = 0;  ///< the mesh's
 };
 
 /// One row of the table: field names are those of the JSON (docs/measuring.md).
@@ -58,6 +69,7 @@ struct BenchColourRow {
     uint64_t bytesRead = 0;                       ///< stored bytes read until settled, from nothing
     uint64_t residentBytes = 0;                   ///< pages in the pool, or Embree's tree and buffers
     uint32_t coarsestLevel = 0, finestLevel = 0;  ///< levels of the pages that are drawn
+    std::optional<DiveChange> dive;               ///< of `certified`; nothing at a dive's first step
 };
 
 struct BenchColourReport {

@@ -16,6 +16,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 Json toJson(const BenchColourRow& row) {
+    const auto ofDive = [&](auto valueOf) { return row.dive ? Json(double(valueOf(*row.dive))) : Json(); };
     return {{"model", row.model},
             {"camera", row.camera},
             {"method", row.method},
@@ -36,7 +37,12 @@ Json toJson(const BenchColourRow& row) {
             {"bytes_read", row.bytesRead},
             {"resident_bytes", row.residentBytes},
             {"coarsest_level", row.coarsestLevel},
-            {"finest_level", row.finestLevel}};
+            {"finest_level", row.finestLevel},
+            {"pop_mean", ofDive([](const DiveChange& dive) { return dive.popMean; })},
+            {"pop_p99", ofDive([](const DiveChange& dive) { return dive.pop.p99; })},
+            {"pop_max", ofDive([](const DiveChange& dive) { return dive.pop.max; })},
+            {"change_mean", ofDive([](const DiveChange& dive) { return dive.changeMean; })},
+            {"mesh_change_mean", ofDive([](const DiveChange& dive) { return dive.meshChangeMean; })}};
 }
 
 Json rowsOf(const BenchColourReport& report) {
@@ -77,6 +83,26 @@ std::string benchColourJson(const BenchColourReport& report) {
 }
 std::string benchColourCsv(const BenchColourReport& report) { return csvOf(rowsOf(report)); }
 
+namespace {
+
+/// What changes along dives; empty where there is none.
+std::string divesOf(const BenchColourReport& report) {
+    std::string text;
+    for (const BenchColourRow& row : report.rows) {
+        if (!row.dive) continue;
+        if (text.empty())
+            text =
+                "\n| model | camera | knob | pop mean | p99 | max | change mean | the mesh's |\n"
+                "|---|---|---|---|---|---|---|---|\n";
+        text += fmt::format("| {} | {} | {} | {:.2f} | {:.2f} | {:.1f} | {:.2f} | {:.2f} |\n", row.model, row.camera,
+                            row.knob, row.dive->popMean, row.dive->pop.p99, row.dive->pop.max, row.dive->changeMean,
+                            row.dive->meshChangeMean);
+    }
+    return text;
+}
+
+}  // namespace
+
 std::string benchColourMarkdown(const BenchColourReport& report) {
     std::string text =
         "| model | camera | cell px | method | knob | pixels | \u0394E mean | p50 | p95 | p99 | max | FLIP | cpu ms | "
@@ -93,6 +119,7 @@ std::string benchColourMarkdown(const BenchColourReport& report) {
                             double(row.geometryBytes) * 1e-6, double(row.colourBytes) * 1e-6,
                             double(row.bytesRead) * 1e-6, double(row.residentBytes) * 1e-6, levels);
     }
+    text += divesOf(report);
     for (const std::string& warning : report.warnings) text += "\n" + warning + "\n";
     return text;
 }

@@ -103,25 +103,6 @@ private:
     int repetitions_;
 };
 
-/// Returns the steps from `whole` to where a cell is kDiveCellPixels wide, at the point that `cells` looks at: what is
-/// looked at moves there from the middle, and the distance shrinks by the same factor from step to step.
-std::vector<NamedCamera> diveCameras(const Camera& whole, const Camera& cells, glm::dvec3 middle, double cell,
-                                     glm::ivec2 size, int steps) {
-    const double perCell = size.y / (2 * std::tan(whole.verticalFov / 2));
-    const glm::dvec3 forward = glm::normalize(whole.forward);
-    const glm::dvec3 target = cells.eye + glm::normalize(cells.forward) * (cell * perCell / kCellsCameraPixels);
-    const double far = glm::distance(whole.eye, middle), near = std::min(cell * perCell / kDiveCellPixels, far);
-    std::vector<NamedCamera> cameras;
-    for (int step = 1; step <= steps; ++step) {
-        const double distance = far * std::pow(near / far, double(step) / steps);
-        const glm::dvec3 seen = target + (middle - target) * ((distance - near) / std::max(far - near, 1e-300));
-        Camera camera = whole;
-        camera.eye = seen - distance * forward;
-        cameras.push_back({fmt::format("dive-{}", step), camera});
-    }
-    return cameras;
-}
-
 ColourPicture greyPicture(const LightPicture& light) {
     ColourPicture picture{light.size.x, light.size.y, {}};
     picture.pixels.reserve(light.light.size());
@@ -185,12 +166,11 @@ private:
     [[nodiscard]] std::vector<NamedCamera> camerasOf(const BenchModel& model, const std::string& name, int view) const {
         const FileHeader& header = model.cache->dataset().header;
         const CellGrid grid{{header.origin[0], header.origin[1], header.origin[2]}, header.cell};
-        const auto of = [&](const char* camera) {
-            return *benchCamera(camera, *model.bvh, grid, o_.size, view, o_.views);
-        };
-        if (name != "dive") return {{name, of(name.c_str())}};
-        return diveCameras(of("whole"), of("cells"), 0.5 * (model.bvh->low() + model.bvh->high()), grid.cell, o_.size,
-                           o_.diveSteps);
+        if (name != "dive") return {{name, *benchCamera(name, *model.bvh, grid, o_.size, view, o_.views)}};
+        std::vector<NamedCamera> cameras;
+        for (const Camera& camera : diveCameras(*model.bvh, grid, o_.size, o_.diveSteps, view, o_.views))
+            cameras.push_back({fmt::format("dive-{}", cameras.size() + 1), camera});
+        return cameras;
     }
 
     /// Draws a camera's frames with all methods: one after the other, so that the mesh's pictures are drawn once.

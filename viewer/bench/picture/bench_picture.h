@@ -1,6 +1,6 @@
 // vcp bench picture: what is drawn against a picture of the mesh itself, 64 samples a pixel, beside what it costs
 // (docs/measuring.md). Cameras: `whole`, `half` and `close` of bench_cameras.h, and `dive`: steps from `whole` to where
-// a finest cell is kDiveCellPixels wide; its steps are rows of their own, dive-1 to dive-N.
+// a finest cell is kDiveCellPixels wide (bench_cameras.h); its steps are rows of their own, dive-1 to dive-N.
 //
 // Methods: `certified`, the renderer, with the pixel error as its knob; `embree`, one ray a pixel through the mesh: the
 // least that a picture of one sample a pixel differs by.
@@ -19,8 +19,6 @@
 #include "octree/io/result.h"
 
 namespace vcp {
-
-inline constexpr double kDiveCellPixels = 200;
 
 struct BenchPictureOptions {
     /// Meshes, or .vcp files beside which the mesh of the same name lies; none: viewer/bench/rays/analytic_models.h.

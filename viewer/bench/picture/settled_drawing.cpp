@@ -60,9 +60,21 @@ Result<void> SettledDrawing::startAnew() {
     return renderer_->open({placed}, {});
 }
 
-Result<PictureCost> SettledDrawing::draw(FrameRequest request) {
+FrameRequest SettledDrawing::withErrors(FrameRequest request) const {
     request.errorPixels = options_.errorPixels;
     request.colourError = colourErrorIn(request.shading.mode, options_.colourError);
+    return request;
+}
+
+Result<void> SettledDrawing::drawUnread(FrameRequest request) {
+    request = withErrors(request);
+    VCP_TRY(renderer_->update(request));
+    VCP_TRY(renderer_->render(request));
+    return renderer_->refineTo(options_.samples, request);
+}
+
+Result<PictureCost> SettledDrawing::draw(FrameRequest request) {
+    request = withErrors(request);
     VCP_TRY_ASSIGN(const auto settled, renderer_->settle(request));
     PictureCost cost{0, reader_->bytes(), settled.residentBytes, settled.coarsestLevel, settled.finestLevel};
     VCP_TRY_ASSIGN(cost.cpuMs, medianCpuMs(options_.repetitions, [&]() -> Result<void> {

@@ -58,6 +58,8 @@ public:
 
     /// Forgets what was read, and opens the file. Errors: those of readDataset and of PictureRenderer::open.
     Result<void> startAnew();
+    /// Draws the request at the options' error with what is in memory, before what it lacks is read.
+    Result<void> drawUnread(FrameRequest request);
     /// Draws the request at the options' error, until settled; renderer() then has the picture.
     Result<PictureCost> draw(FrameRequest request);
     [[nodiscard]] PictureRenderer& renderer() { return *renderer_; }
@@ -65,6 +67,8 @@ public:
 private:
     SettledDrawing(std::unique_ptr<PictureRenderer> renderer, std::filesystem::path file, const Options& options)
         : renderer_(std::move(renderer)), file_(std::move(file)), options_(options) {}
+
+    [[nodiscard]] FrameRequest withErrors(FrameRequest request) const;
 
     std::unique_ptr<PictureRenderer> renderer_;
     std::filesystem::path file_;

@@ -109,4 +109,24 @@ std::optional<Camera> benchCamera(std::string_view name, const MeshBvh& mesh, co
     return camera;
 }
 
+std::vector<Camera> diveCameras(const MeshBvh& mesh, const CellGrid& grid, glm::ivec2 size, int steps, int view,
+                                int views) {
+    const Camera whole = *benchCamera("whole", mesh, grid, size, view, views);
+    const Camera cells = *benchCamera("cells", mesh, grid, size, view, views);
+    const glm::dvec3 middle = 0.5 * (mesh.low() + mesh.high());
+    const double perCell = size.y / (2 * std::tan(whole.verticalFov / 2));
+    const glm::dvec3 forward = glm::normalize(whole.forward);
+    const glm::dvec3 target = cells.eye + glm::normalize(cells.forward) * (grid.cell * perCell / kCellsCameraPixels);
+    const double far = glm::distance(whole.eye, middle), near = std::min(grid.cell * perCell / kDiveCellPixels, far);
+    std::vector<Camera> cameras;
+    for (int step = 1; step <= steps; ++step) {
+        const double distance = far * std::pow(near / far, double(step) / steps);
+        const glm::dvec3 seen = target + (middle - target) * ((distance - near) / std::max(far - near, 1e-300));
+        Camera camera = whole;
+        camera.eye = seen - distance * forward;
+        cameras.push_back(camera);
+    }
+    return cameras;
+}
+
 }  // namespace vcp

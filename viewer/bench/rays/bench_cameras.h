@@ -27,6 +27,9 @@ namespace vcp {
 /// How many pixels wide a finest cell is for the camera `cells`, at the point looked at.
 inline constexpr double kCellsCameraPixels = 8;
 
+/// How many pixels wide a finest cell is where a dive ends.
+inline constexpr double kDiveCellPixels = 200;
+
 /// Returns the names; the first four are those of a comparison.
 const std::vector<std::string>& benchCameraNames();
 
@@ -41,5 +44,10 @@ struct CellGrid {
 /// name.
 std::optional<Camera> benchCamera(std::string_view name, const MeshBvh& mesh, const CellGrid& grid, glm::ivec2 size,
                                   int view, int views);
+
+/// Returns the steps of a dive from `whole` to where a cell is kDiveCellPixels wide, at the point that `cells` looks
+/// at: what is looked at moves there from the middle, and the distance shrinks by the same factor from step to step.
+std::vector<Camera> diveCameras(const MeshBvh& mesh, const CellGrid& grid, glm::ivec2 size, int steps, int view,
+                                int views);
 
 }  // namespace vcp

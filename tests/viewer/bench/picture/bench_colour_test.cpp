@@ -78,10 +78,11 @@ TEST_F(BenchColour, RowsHaveTheFieldsThatProgramsRelyOn) {
     EXPECT_EQ(rows.size(), 9u);
     for (const auto& [name, row] : rows) {
         for (const char* field :
-             {"model",           "camera",         "method",       "knob",           "device",       "pixels",
-              "compared_pixels", "cell_px",        "delta_e_mean", "delta_e_p50",    "delta_e_p95",  "delta_e_p99",
-              "delta_e_max",     "flip_mean",      "cpu_ms",       "geometry_bytes", "colour_bytes", "bytes_read",
-              "resident_bytes",  "coarsest_level", "finest_level"})
+             {"model",           "camera",          "method",       "knob",           "device",       "pixels",
+              "compared_pixels", "cell_px",         "delta_e_mean", "delta_e_p50",    "delta_e_p95",  "delta_e_p99",
+              "delta_e_max",     "flip_mean",       "cpu_ms",       "geometry_bytes", "colour_bytes", "bytes_read",
+              "resident_bytes",  "coarsest_level",  "finest_level", "pop_mean",       "pop_p99",      "pop_max",
+              "change_mean",     "mesh_change_mean"})
             EXPECT_TRUE(row.contains(field)) << field;
         EXPECT_EQ(row["pixels"], 96 * 64);
         EXPECT_GT(row["compared_pixels"], 0);
@@ -142,6 +143,21 @@ TEST_F(BenchColour, CornersAreNoWorseThanColoursOfTheMeshsVertices) {
         const double vertex = rows.at(std::string(camera) + " vertex")["delta_e_mean"];
         EXPECT_LT(certified, 1.15 * vertex + 0.1) << camera;
     }
+}
+
+TEST_F(BenchColour, ADiveSaysWhatPops) {
+    const fs::path square = writeSquare(16, 1024, [](uint32_t x, uint32_t y, int channel) {
+        return uint8_t((x * 37 + y * 91 + uint32_t(channel) * 50) * 2654435761u >> 24);
+    });
+    const auto rows = rowsOf(square, "--cameras dive --dive-steps 3 --methods certified,texture");
+    ASSERT_EQ(rows.size(), 6u);
+    EXPECT_TRUE(rows.at("dive-1 certified")["pop_mean"].is_null()) << "nothing was there before";
+    EXPECT_TRUE(rows.at("dive-2 texture")["pop_mean"].is_null());
+    // The first step shows two texels a sample, so the finest level comes with the second.
+    EXPECT_GT(rows.at("dive-2 certified")["pop_mean"], 1);
+    EXPECT_LT(rows.at("dive-3 certified")["pop_max"], 0.01) << "all was there";
+    EXPECT_NEAR(rows.at("dive-3 certified")["change_mean"], rows.at("dive-3 certified")["mesh_change_mean"], 2);
+    EXPECT_NEAR(rows.at("dive-3 certified")["cell_px"], 200, 2);
 }
 
 TEST_F(BenchColour, WritesReportAndPictures) {

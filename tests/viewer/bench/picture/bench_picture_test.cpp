@@ -13,6 +13,7 @@
 #include "tests/support/vcp_program.h"
 #include "viewer/bench/picture/bench_picture.h"
 #include "viewer/bench/rays/analytic_models.h"
+#include "viewer/bench/rays/bench_cameras.h"
 #include "viewer/bench/rays/bench_rays.h"
 
 namespace vcp {
