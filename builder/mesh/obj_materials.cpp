@@ -80,25 +80,27 @@ void ObjMaterials::use(std::string_view name) {
                                     file_, shown(trimmed(name))));
 }
 
-Result<void> ObjMaterials::addUv(double u, double v) {
-    const glm::vec2 uv{float(u), float(v)};
-    return uvs_.append(std::isfinite(uv.x) && std::isfinite(uv.y) ? uv : glm::vec2(0));
-}
+Result<void> ObjMaterials::addUv(double u, double v) { return uvs_.append(glm::vec2(float(u), float(v))); }
 
 Result<void> ObjMaterials::paint(const std::array<std::optional<uint64_t>, 3>& uvs, MeshChunk& chunk) {
     std::array<glm::vec2, 3> corners{};
+    const auto where = [&] { return fmt::format("{}: triangle {}", file_, painted_); };
     if (current_ != kNoMaterial && (materials_[current_].hasImages() || materials_[current_].mask.exists())) {
         const MtlMaterial& material = read_[current_];
         for (size_t i = 0; i < 3; ++i) {
-            if (!uvs[i]) continue;
+            if (!uvs[i]) {
+                check_.noteAbsent(where, warnings_);
+                continue;
+            }
             VCP_TRY_ASSIGN(const auto uv, uvs_.at(*uvs[i]));
-            corners[i] = uv * material.uvScale + material.uvOffset;
+            corners[i] = check_.usable(uv, where, warnings_) * material.uvScale + material.uvOffset;
             corners[i].y = 1 - corners[i].y;  // v grows upwards in OBJ
-            if (!std::isfinite(corners[i].x) || !std::isfinite(corners[i].y)) corners[i] = glm::vec2(0);
+            corners[i] = check_.usable(corners[i], where, warnings_);
         }
     }
     chunk.uvs.push_back(corners);
     chunk.materials.push_back(current_);
+    ++painted_;
     return {};
 }
 

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "builder/mesh/mtl.h"
+#include "builder/stream/coordinate_check.h"
 #include "builder/stream/mesh_stream.h"
 #include "builder/stream/spilled_array.h"
 
@@ -56,6 +57,8 @@ private:
     std::vector<SideFile> sideFiles_;
     bool unknownNamed_ = false;
     uint32_t current_ = kNoMaterial;
+    uint64_t painted_ = 0;  // triangles
+    CoordinateCheck check_;
     SpilledArray<glm::vec2> uvs_;
 };
 

@@ -17,6 +17,7 @@
 #include "builder/mesh/gltf/gltf_scene.h"
 #include "builder/stream/chunk_room.h"
 #include "builder/stream/colour_encoding.h"
+#include "builder/stream/coordinate_check.h"
 #include "builder/stream/data_uri.h"
 #include "builder/stream/number_text.h"
 #include "octree/surface/leaf_math.h"
@@ -110,18 +111,23 @@ private:
             images.push_back(std::move(image));
         }
         materials_ = materialsOf(document_, images);
-        eachPrimitive([&](const GltfPlacement&, const GltfPrimitive& primitive) {
+        eachPrimitive([&](const GltfPlacement& placement, const GltfPrimitive& primitive) {
             info_.hasMaterials = info_.hasMaterials || hasImage(primitive) || isCutOut(primitive);
+            if (wantsImage(primitive) && !hasCoordinates(primitive))
+                check_.noteAbsent([&] { return fmt::format("{}: mesh {}", name_, placement.mesh); }, warnings_);
         });
         if (!info_.hasMaterials) materials_.clear();
         return {};
     }
 
-    bool hasImage(const GltfPrimitive& primitive) const {
-        const bool hasUv = primitive.draco ? primitive.draco->uv.has_value() : primitive.uv.has_value();
-        return hasUv && primitive.material && *primitive.material < materials_.size() &&
+    static bool hasCoordinates(const GltfPrimitive& primitive) {
+        return primitive.draco ? primitive.draco->uv.has_value() : primitive.uv.has_value();
+    }
+    bool wantsImage(const GltfPrimitive& primitive) const {
+        return primitive.material && *primitive.material < materials_.size() &&
                materials_[*primitive.material].hasImages();
     }
+    bool hasImage(const GltfPrimitive& primitive) const { return hasCoordinates(primitive) && wantsImage(primitive); }
 
     // Whether nothing is left of a primitive, with or without an image.
     bool isCutOut(const GltfPrimitive& primitive) const {
@@ -306,7 +312,7 @@ private:
             for (Rgba8& c : chunk.colours) c = modulate(c, factor);
     }
 
-    void paint(const GltfPrimitive& primitive, MeshChunk& chunk) const {
+    void paint(const GltfPrimitive& primitive, MeshChunk& chunk) {
         if (!info_.hasMaterials) {
             chunk.uvs.clear();
             return;
@@ -318,12 +324,15 @@ private:
             chunk.uvs.assign(chunk.triangles.size(), {});
             return;
         }
+        const auto where = [&] {
+            return fmt::format("{}: mesh {}, primitive {}", name_, placements_[placement_].mesh, primitive_);
+        };
         const auto& matrix = document_.materials[*primitive.material].texture.uvMatrix;
         for (auto& corners : chunk.uvs)
             for (glm::vec2& uv : corners) {
                 const glm::dvec3 at(uv, 1);
                 uv = glm::vec2(glm::dot(matrix[0], at), glm::dot(matrix[1], at));
-                if (!std::isfinite(uv.x) || !std::isfinite(uv.y)) uv = glm::vec2(0);
+                uv = check_.usable(uv, where, warnings_);
             }
     }
 
@@ -341,6 +350,7 @@ private:
     MeshInfo info_;
     std::vector<Material> materials_;
     std::vector<std::string> warnings_;
+    CoordinateCheck check_;
 
     size_t placement_ = 0;
     std::optional<GltfInstances> instances_;

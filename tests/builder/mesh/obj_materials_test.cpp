@@ -55,7 +55,8 @@ TEST_F(ObjMaterialFiles, TexturesComeWithCoordinatesFromTheTop) {
     write("my wood.png", "never looked into");
     const Painted mesh = read("mtllib a b.mtl\n" + kTexturedSquare +
                               "usemtl wood\nf 1/1 2/2 3/3 -1/-1\nusemtl plain\nf 1 2 3\nusemtl wood\nf 1/9 2/2 3//1\n");
-    EXPECT_TRUE(mesh.active && mesh.warnings.empty()) << mesh.warnings.size();
+    EXPECT_TRUE(mesh.active);
+    ASSERT_EQ(mesh.warnings.size(), 1u) << "the corners without coordinates";
     ASSERT_EQ(mesh.list.size(), 2u);
     EXPECT_EQ(mesh.list[0].image.path, folder_ / "my wood.png");
     EXPECT_EQ(mesh.list[0].factor, kWhite) << "Kd beside an image does not count";
@@ -133,6 +134,22 @@ TEST_F(ObjMaterialFiles, PlainColoursCountWhereTheyDiffer) {
     EXPECT_EQ(mesh.materials, (std::vector<uint32_t>{0, 1}));
     EXPECT_EQ(mesh.list[1].factor, 0xFF00FF00u);
     EXPECT_FALSE(read("mtllib two.mtl\n" + faces, {.format = "", .materials = false}).active);
+}
+
+TEST_F(ObjMaterialFiles, CoordinatesOfNoUseAreAWarning) {
+    write("m.mtl", "newmtl a\nmap_Kd a.png\nnewmtl plain\nKd 1 0 0\n");
+    write("a.png", "never looked into");
+    const Painted mesh = read(
+        "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nvt 0 0\nvt nan 0\nvt 2e6 0\nvt 0 inf\nusemtl plain\nf 1 2 3\n"
+        "usemtl a\nf 1/1 2/1 3/2\nf 1/1 2/1 3/3\nf 1/1 2/1 3\nf 1/4 2/3 3\n");
+    ASSERT_EQ(mesh.warnings.size(), 3u) << "each kind once";
+    EXPECT_NE(mesh.warnings[0].find("mesh.obj: triangle 1 has texture coordinates that are no numbers"),
+              std::string::npos)
+        << mesh.warnings[0];
+    EXPECT_NE(mesh.warnings[1].find("triangle 2 has texture coordinates beyond 1,000,000"), std::string::npos);
+    EXPECT_NE(mesh.warnings[2].find("triangle 3 has an image and no texture coordinates"), std::string::npos);
+    EXPECT_EQ(mesh.uvs[1][2], glm::vec2(0, 1)) << "0 stands for what is no number";
+    EXPECT_EQ(mesh.uvs[2][2].x, 2e6f);
 }
 
 TEST_F(ObjMaterialFiles, WhatIsMissingIsAWarning) {
