@@ -86,7 +86,8 @@ struct BuildOptions {
     ImageQuality imageQuality;
     bool channels = true;  ///< with the images: what materials have beside their colour (MaterialChannels)
     VertexNormals vertexNormals = VertexNormals::Mesh;
-    bool masks = true;  ///< what the alpha of materials leaves out is no surface (MaskRule); false: it is
+    bool allowOutside = false;  ///< files that a mesh names are opened also outside its folder
+    bool masks = true;          ///< what the alpha of materials leaves out is no surface (MaskRule); false: it is
     /// Is given what is read, for a picture meanwhile (mesh_sample.h); nothing where work is resumed. May be empty.
     std::shared_ptr<MeshSample> sample;
     /// Called from one thread at a time, about ten times a second and whenever a stage begins. Returning false cancels;

@@ -203,6 +203,7 @@ std::string settingsText(const BuildOptions& options) {
                     options.errorIsRelative, int(options.colour), int(options.coarseLeaves), keepsImages(options),
                     quality.finest.value_or(-1), quality.coarser.value_or(-1), int(options.vertexNormals),
                     options.masks, options.channels, options.format);
+    if (options.allowOutside) text += " outside";
     if (options.origin) text += fmt::format(" {:a} {:a} {:a}", options.origin->x, options.origin->y, options.origin->z);
     return text;
 }

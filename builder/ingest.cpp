@@ -298,6 +298,7 @@ Result<double> maskDetailOf(const std::filesystem::path& path, const BuildOption
 MeshOpenOptions meshOptionsOf(const BuildOptions& options) {
     MeshOpenOptions open;
     open.format = options.format;
+    open.allowOutside = options.allowOutside;
     open.materials = options.masks || options.colour == ColourChoice::Auto || options.colour == ColourChoice::Texture;
     return open;
 }

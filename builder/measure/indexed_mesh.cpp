@@ -84,8 +84,10 @@ Result<void> append(MeshStream& stream, const std::string& name, const LoadOptio
 
 constexpr uint64_t kMaskBytes = uint64_t{1} << 30;
 
-Result<std::unique_ptr<MeshStream>> openCut(const std::filesystem::path& path, const MeshOpenOptions& open,
-                                            const LoadOptions& options) {
+Result<std::unique_ptr<MeshStream>> openCut(const std::filesystem::path& path, const LoadOptions& options) {
+    MeshOpenOptions open;
+    open.coordinates = options.coordinates;
+    open.allowOutside = options.allowOutside;
     VCP_TRY_ASSIGN(auto stream, openMesh(path, open));
     if (!options.masks || options.coordinates != Coordinates::OfMaterials) return stream;
     return maskedStream(std::move(stream), kMaskBytes);
@@ -102,16 +104,14 @@ Result<IndexedMesh> loadMesh(MeshStream& stream, const std::string& name, const 
 }
 
 Result<IndexedMesh> loadMesh(const std::filesystem::path& path, const LoadOptions& options) {
-    MeshOpenOptions open;
-    open.coordinates = options.coordinates;
-    VCP_TRY_ASSIGN(const auto stream, openCut(path, open, options));
+    VCP_TRY_ASSIGN(const auto stream, openCut(path, options));
     return loadMesh(*stream, path.string(), options);
 }
 
 Result<IndexedMesh> loadMesh(std::span<const std::filesystem::path> paths, const LoadOptions& options) {
     IndexedMesh mesh;
     for (size_t file = 0; file < paths.size(); ++file) {
-        VCP_TRY_ASSIGN(const auto stream, openCut(paths[file], {}, options));
+        VCP_TRY_ASSIGN(const auto stream, openCut(paths[file], options));
         VCP_TRY(append(*stream, paths[file].string(), options, mesh, file));
     }
     if (mesh.triangles.empty())

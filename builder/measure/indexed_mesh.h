@@ -39,6 +39,7 @@ struct LoadOptions {
     bool normals = false;  ///< whether the mesh gets its normals
     /// Whether files are cut by the masks of their materials; only without coordinates.
     bool masks = true;
+    bool allowOutside = false;  ///< as in MeshOpenOptions
     uint64_t mostTriangles = std::numeric_limits<uint32_t>::max();
     uint64_t mostPositions = std::numeric_limits<uint32_t>::max();
     /// Takes the part of the file that is read, from 0 to 1; returning false cancels.

@@ -63,9 +63,9 @@ struct MapPlace {
 
 class MtlReader {
 public:
-    MtlReader(const std::filesystem::path& path, std::vector<MtlMaterial>& materials,
+    MtlReader(const std::filesystem::path& path, bool allowOutside, std::vector<MtlMaterial>& materials,
               std::vector<std::string>& warnings, std::vector<SideFile>& sideFiles)
-        : path_(path), materials_(materials), warnings_(warnings), sideFiles_(sideFiles) {}
+        : path_(path), allowOutside_(allowOutside), materials_(materials), warnings_(warnings), sideFiles_(sideFiles) {}
 
     void read() {
         sideFiles_.emplace_back(path_);
@@ -172,11 +172,12 @@ private:
         while (words.peek().starts_with('-')) readOption(words, uvScale, uvOffset);
         const std::string name = words.rest();
         if (name.empty()) return;
-        const auto path = nameBelow(path_.parent_path(), name);
+        const auto path = nameBelow(path_.parent_path(), name, allowOutside_);
         if (path) sideFiles_.emplace_back(*path);
         std::error_code ignored;
         if (!path)
-            warn(fmt::format("the image {} lies outside its folder; it is left out", shown(name)));
+            warn(fmt::format("the image {} lies outside its folder, which was not allowed; it is left out",
+                             shown(name)));
         else if (!std::filesystem::is_regular_file(*path, ignored))
             warn(fmt::format("the image {} is missing; it is left out", shown(name)));
         else
@@ -236,6 +237,7 @@ private:
     }
 
     std::filesystem::path path_;
+    bool allowOutside_;
     std::vector<MtlMaterial>& materials_;
     std::vector<std::string>& warnings_;
     std::vector<SideFile>& sideFiles_;
@@ -246,9 +248,9 @@ private:
 
 }  // namespace
 
-void readMtl(const std::filesystem::path& path, std::vector<MtlMaterial>& materials, std::vector<std::string>& warnings,
-             std::vector<SideFile>& sideFiles) {
-    MtlReader(path, materials, warnings, sideFiles).read();
+void readMtl(const std::filesystem::path& path, bool allowOutside, std::vector<MtlMaterial>& materials,
+             std::vector<std::string>& warnings, std::vector<SideFile>& sideFiles) {
+    MtlReader(path, allowOutside, materials, warnings, sideFiles).read();
 }
 
 }  // namespace vcp

@@ -22,7 +22,10 @@ std::string_view trimmed(std::string_view text) {
 }  // namespace
 
 ObjMaterials::ObjMaterials(const std::filesystem::path& path, const MeshOpenOptions& options)
-    : file_(path.string()), wanted_(options.materials && !path.empty() && path != "-"), uvs_(options.tempFolder) {
+    : file_(path.string()),
+      wanted_(options.materials && !path.empty() && path != "-"),
+      allowOutside_(options.allowOutside),
+      uvs_(options.tempFolder) {
     folder_ = path.has_parent_path() ? path.parent_path() : std::filesystem::path(".");
 }
 
@@ -35,15 +38,16 @@ void ObjMaterials::addLibrary(std::string_view names) {
         return;
     }
     const auto add = [&](std::string_view name) {
-        const auto path = nameBelow(folder_, std::string(name));
+        const auto path = nameBelow(folder_, std::string(name), allowOutside_);
         if (path)
-            readMtl(*path, read_, warnings_, sideFiles_);
+            readMtl(*path, allowOutside_, read_, warnings_, sideFiles_);
         else
             warnings_.push_back(
-                fmt::format("{}: the material file {} lies outside its folder; it is left out", file_, shown(name)));
+                fmt::format("{}: the material file {} lies outside its folder, which was not allowed; it is left out",
+                            file_, shown(name)));
     };
     // The text is one name with spaces, or several names.
-    const auto whole = nameBelow(folder_, std::string(names));
+    const auto whole = nameBelow(folder_, std::string(names), allowOutside_);
     if (whole) sideFiles_.emplace_back(*whole);
     std::error_code ignored;
     if (names.find_first_of(" \t") == std::string_view::npos ||

@@ -47,6 +47,7 @@ private:
     std::string file_;
     std::filesystem::path folder_;
     bool wanted_;
+    bool allowOutside_;
     bool begun_ = false;
     bool active_ = false;
     bool hasImages_ = false;

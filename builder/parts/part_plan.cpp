@@ -68,6 +68,7 @@ json jsonOf(const PartPlan& plan) {
             {"image_quality", {o.imageQuality.finest.value_or(-1), o.imageQuality.coarser.value_or(-1)}},
             {"memory", o.memoryBytes},
             {"vertex_normals", int(o.vertexNormals)},
+            {"allow_outside", o.allowOutside},
             {"masks", o.masks},
             {"channels", o.channels}};
 }
@@ -93,6 +94,7 @@ PartPlan planFrom(const json& j) {
     if (quality[0] >= 0) plan.options.imageQuality.finest = quality[0];
     if (quality[1] >= 0) plan.options.imageQuality.coarser = quality[1];
     plan.options.vertexNormals = VertexNormals(j.at("vertex_normals").get<int>());
+    plan.options.allowOutside = j.at("allow_outside").get<bool>();
     plan.options.masks = j.at("masks").get<bool>();
     plan.options.channels = j.at("channels").get<bool>();
     plan.options.memoryBytes = j.at("memory").get<uint64_t>();

@@ -50,17 +50,19 @@ std::optional<std::string> decodeDataUri(std::string_view uri) {
     return data;
 }
 
-std::optional<std::filesystem::path> nameBelow(const std::filesystem::path& folder, std::string name) {
+std::optional<std::filesystem::path> nameBelow(const std::filesystem::path& folder, std::string name,
+                                               bool allowOutside) {
     std::ranges::replace(name, '\\', '/');
     const bool drive = name.size() > 1 && name[1] == ':';
-    if (name.empty() || name.find('\0') != std::string::npos || name.front() == '/' || drive) return std::nullopt;
+    if (name.empty() || name.find('\0') != std::string::npos || drive) return std::nullopt;
     const std::filesystem::path path(name);
-    for (const auto& part : path)
-        if (part == "..") return std::nullopt;
+    const bool isOutside = path.is_absolute() || std::ranges::find(path, "..") != path.end();
+    if (isOutside && !allowOutside) return std::nullopt;
     return folder / path;
 }
 
-std::optional<std::filesystem::path> fileBelow(const std::filesystem::path& folder, std::string_view uri) {
+std::optional<std::filesystem::path> fileBelow(const std::filesystem::path& folder, std::string_view uri,
+                                               bool allowOutside) {
     const size_t colon = uri.find(':');
     if (colon != std::string_view::npos && colon < uri.find('/')) return std::nullopt;  // a scheme
     std::string name;
@@ -74,7 +76,7 @@ std::optional<std::filesystem::path> fileBelow(const std::filesystem::path& fold
             name += uri[i];
         }
     }
-    return nameBelow(folder, std::move(name));
+    return nameBelow(folder, std::move(name), allowOutside);
 }
 
 }  // namespace vcp

@@ -14,10 +14,13 @@ inline bool isDataUri(std::string_view uri) { return uri.starts_with("data:"); }
 std::optional<std::string> decodeDataUri(std::string_view uri);
 
 /// Returns the file that a relative URI names (RFC 3986, percent-encoded UTF-8), below `folder`. Returns nothing when
-/// it names a scheme, a root, a drive or a parent folder: nothing outside the folder is ever opened.
-std::optional<std::filesystem::path> fileBelow(const std::filesystem::path& folder, std::string_view uri);
+/// it names a scheme, a root, a drive or a parent folder: nothing outside the folder is opened, unless `allowOutside`
+/// says that a root and parent folders do.
+std::optional<std::filesystem::path> fileBelow(const std::filesystem::path& folder, std::string_view uri,
+                                               bool allowOutside = false);
 
 /// Does the same for a name that is not encoded, with either slash (MTL).
-std::optional<std::filesystem::path> nameBelow(const std::filesystem::path& folder, std::string name);
+std::optional<std::filesystem::path> nameBelow(const std::filesystem::path& folder, std::string name,
+                                               bool allowOutside = false);
 
 }  // namespace vcp

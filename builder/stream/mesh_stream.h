@@ -106,6 +106,8 @@ struct MeshOpenOptions {
     /// Where the content is beyond doubt, it decides; a pipe needs this where the content is not.
     std::string format;
     bool materials = true;  ///< false: MTL files are not looked for, chunks carry no uvs
+    /// Whether files that a mesh names are opened also where they lie outside its folder.
+    bool allowOutside = false;
     /// The folder for data that must be read more than once (texture coordinates of a large OBJ, a piped GLB), in a
     /// file without a name. Empty: the system's folder for such files.
     std::filesystem::path tempFolder = {};

@@ -70,6 +70,7 @@ void addBuildSettings(CLI::App& app, BuildOptions& options, const char* group) {
     addImages(app, options);
     addVertexNormals(app, options);
     addMasks(app, options.masks);
+    addAllowOutside(app, options.allowOutside);
     addParsed(app, "--leaves", options.coarseLeaves, leavesNamed, "slabs or mesh",
               "What coarser levels are made of: slabs (one plane a cell) or mesh (triangles of clustered vertices, and "
               "vectors at corners where they suffice; always with --error)")
@@ -144,6 +145,12 @@ void addVertexNormals(CLI::App& app, BuildOptions& options) {
 void addMasks(CLI::App& app, bool& masks) {
     app.add_flag("--masks,!--no-masks", masks,
                  "Cut out what the alpha of materials leaves out, as of leaves and fences [on]");
+}
+
+void addAllowOutside(CLI::App& app, bool& allowOutside) {
+    app.add_flag(
+        "--allow-outside", allowOutside,
+        "Read also images, material files and buffers that lie outside the folder of the mesh that names them");
 }
 
 void addFormat(CLI::App& app, BuildOptions& options) {

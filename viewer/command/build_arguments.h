@@ -24,6 +24,7 @@ void addColourChoice(CLI::App& app, BuildOptions& options);
 void addImages(CLI::App& app, BuildOptions& options);
 void addVertexNormals(CLI::App& app, BuildOptions& options);
 void addMasks(CLI::App& app, bool& masks);
+void addAllowOutside(CLI::App& app, bool& allowOutside);
 void addFormat(CLI::App& app, BuildOptions& options);
 void addTempFolder(CLI::App& app, BuildOptions& options, const std::string& description);
 

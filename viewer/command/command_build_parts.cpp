@@ -123,6 +123,7 @@ Command addBuildPlan(CLI::App& vcp) {
     addImages(*app, command->settings);
     addVertexNormals(*app, command->settings);
     addMasks(*app, command->settings.masks);
+    addAllowOutside(*app, command->settings.allowOutside);
     addFormat(*app, command->settings);
     addMemory(*app, command->settings.memoryBytes,
               "Memory that each part may take: 512M, 4G, 50% [half of its machine's]");

@@ -28,7 +28,7 @@ struct CompareCommand {
     std::string csv;
     bool overwrite = false;
     bool both = false;
-    bool masks = true;
+    bool masks = true, allowOutside = false;
     uint64_t samples = 200'000;
     std::optional<Length> error, within, range;
     std::optional<LengthUnit> unit;
@@ -113,7 +113,9 @@ private:
         if (kind == InputKind::Scene)
             return Error{.code = ErrorCode::Usage, .message = "is a scene; give a .vcp file or a mesh", .file = input};
         if (kind == InputKind::Meshes) {
-            VCP_TRY_ASSIGN(surface.mesh, loadMesh(input, {.masks = command_.masks, .progress = progress(stage)}));
+            VCP_TRY_ASSIGN(surface.mesh, loadMesh(input, {.masks = command_.masks,
+                                                          .allowOutside = command_.allowOutside,
+                                                          .progress = progress(stage)}));
             return {};
         }
         VCP_TRY_ASSIGN(const auto reader, openReader(input, command_.render.source));
@@ -256,6 +258,7 @@ Command addCompare(CLI::App& vcp) {
     beginGroup(*app, help_group::kMeasured);
     app->add_flag("--both", command->both, "Measure B from A as well");
     addMasks(*app, command->masks);
+    addAllowOutside(*app, command->allowOutside);
     app->add_option("--samples", command->samples, "Points of the surface, evenly by area, for the figures")
         ->type_name("N")
         ->capture_default_str()

@@ -23,7 +23,7 @@ namespace {
 struct VerifyCommand {
     std::string file;
     std::vector<std::string> against;
-    bool masks = true;
+    bool masks = true, allowOutside = false;
     uint64_t samples = 200'000;
     uint32_t level = UINT32_MAX;
     unsigned threads = 0;
@@ -77,6 +77,7 @@ Result<SurfaceDistance> measure(const VerifyCommand& command, const std::shared_
     MeshPaint paint;
     LoadOptions load;
     load.masks = command.masks;
+    load.allowOutside = command.allowOutside;
     load.chunk = [&](size_t file, const MeshStream& stream, const MeshChunk& chunk) { paint.add(file, stream, chunk); };
     VCP_TRY_ASSIGN(const auto mesh, loadMesh(meshes, load));
     display.update("sorting the mesh", 0.1);
@@ -221,6 +222,7 @@ Command addVerify(CLI::App& vcp) {
     app->add_option("--against", command->against, "The meshes it was built from: measures the distance, both ways")
         ->type_name("MESH");
     addMasks(*app, command->masks);
+    addAllowOutside(*app, command->allowOutside);
     app->add_option("--samples", command->samples, "Samples, each way")
         ->type_name("N")
         ->capture_default_str()

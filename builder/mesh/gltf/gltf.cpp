@@ -36,7 +36,9 @@ public:
           options_(options),
           document_(std::move(document)),
           buffers_(document_, name_, std::move(folder), std::move(binary),
-                   {.tempFolder = options.tempFolder, .decoderBytes = options.decoderBytes}) {}
+                   {.tempFolder = options.tempFolder,
+                    .decoderBytes = options.decoderBytes,
+                    .allowOutside = options.allowOutside}) {}
 
     Result<void> begin(std::string format, uint64_t fileBytes) {
         info_.format = std::move(format);
@@ -155,7 +157,7 @@ private:
         } else if (!image.data.empty()) {
             source.bytes = std::make_shared<const std::string>(std::move(image.data));
         } else if (!image.uri.empty()) {
-            const auto path = folder_.empty() ? std::nullopt : fileBelow(folder_, image.uri);
+            const auto path = folder_.empty() ? std::nullopt : fileBelow(folder_, image.uri, options_.allowOutside);
             if (path) buffers_.sideFiles.emplace_back(*path);
             std::error_code ignored;
             if (!path)

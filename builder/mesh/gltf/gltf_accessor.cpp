@@ -68,7 +68,7 @@ Result<RandomBytes*> GltfBuffers::open(uint32_t number) {
     if (!opened && buffer.embedded) {
         opened = randomBytesOf(std::move(buffer.data));
     } else if (!opened) {
-        const auto path = folder_.empty() ? std::nullopt : fileBelow(folder_, buffer.uri);
+        const auto path = folder_.empty() ? std::nullopt : fileBelow(folder_, buffer.uri, room_.allowOutside);
         if (!path)
             return wrong(folder_.empty() ? "lies in another file, but standard input has no folder; use a GLB"
                                          : "its URI names no file in the folder of the glTF file");

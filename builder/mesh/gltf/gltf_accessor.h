@@ -20,6 +20,7 @@ public:
     struct Room {
         std::filesystem::path tempFolder;  ///< empty: the system's
         uint64_t decoderBytes = uint64_t{1} << 30;
+        bool allowOutside = false;  ///< as in MeshOpenOptions
     };
 
     /// `document` must outlive this; the data of its data URIs are moved from it. `folder` holds external buffers

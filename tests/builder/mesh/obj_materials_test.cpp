@@ -165,6 +165,31 @@ TEST_F(ObjMaterialFiles, WhatIsMissingIsAWarning) {
     EXPECT_EQ(mesh.materials, (std::vector<uint32_t>{kNoMaterial, kNoMaterial}));
 }
 
+TEST_F(ObjMaterialFiles, FilesOutsideTheFolderAreReadWhereThatIsAllowed) {
+    const std::filesystem::path outside = folder_ / "outside", inside = folder_ / "mesh";
+    std::filesystem::create_directories(outside);
+    std::filesystem::create_directories(inside);
+    std::ofstream(outside / "picture.png") << "picture";
+    std::ofstream(outside / "m.mtl") << "newmtl a\nmap_Kd picture.png\n";
+    std::ofstream(inside / "n.mtl") << "newmtl b\nmap_Kd ../outside/picture.png\nnewmtl c\nmap_Kd "
+                                    << (outside / "picture.png").string() << "\n";
+    std::ofstream(inside / "mesh.obj") << "mtllib ../outside/m.mtl n.mtl\n" + kTexturedSquare +
+                                              "usemtl a\nf 1/1 2/2 3/3\n";
+    const auto materialsOf = [&](bool allowOutside) {
+        const auto stream = openMesh(inside / "mesh.obj", {.format = "", .allowOutside = allowOutside});
+        EXPECT_TRUE(stream.ok());
+        MeshChunk chunk;
+        while (*(*stream)->next(chunk)) continue;
+        size_t images = 0;
+        for (const Material& material : (*stream)->materials()) images += material.image.exists() ? 1 : 0;
+        return std::pair((*stream)->warnings().size(), images);
+    };
+    EXPECT_EQ(materialsOf(true), std::pair(size_t{0}, size_t{3}));
+    const auto [warnings, images] = materialsOf(false);
+    EXPECT_EQ(images, 0u);
+    EXPECT_EQ(warnings, 3u) << "the material file and both images";
+}
+
 TEST_F(ObjMaterialFiles, ALibraryBeyondTheStartIsAWarning) {
     write("m.mtl", "newmtl a\nKd 1 0 0\nnewmtl b\nKd 0 1 0\n");
     const std::string filler(300'000, '\n');

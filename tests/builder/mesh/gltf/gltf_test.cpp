@@ -286,6 +286,14 @@ TEST(Gltf, NothingOutsideTheFolderIsOpened) {
         ASSERT_TRUE(mesh.error) << uri;
         EXPECT_NE(mesh.line().find("names no file in the folder"), std::string::npos) << mesh.line();
     }
+    const auto readAllowed = [&](const std::string& uri) {
+        const auto path = folder / "inner/mesh.gltf";
+        std::ofstream(path) << file.json(uri);
+        return readAll(openMesh(path, {.format = "", .allowOutside = true}));
+    };
+    EXPECT_FALSE(readAllowed("../outside.bin").error) << readAllowed("../outside.bin").line();
+    EXPECT_FALSE(readAllowed(absolute).error);
+    EXPECT_TRUE(readAllowed("file://" + absolute).error) << "that is no path";
     EXPECT_NE(readUri("absent.bin").line().find("no such file"), std::string::npos);
     EXPECT_NE(readUri("data").line().find("not a regular file"), std::string::npos);
     std::ofstream(folder / "inner/short.bin", std::ios::binary) << file.buffer.substr(0, 20);
