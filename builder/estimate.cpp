@@ -24,7 +24,9 @@ namespace {
 // Bytes of a triangle on the temporary disk (the soup while it is dealt, then the finest level's bins with what has
 // been built of it) and in the file (2.4 to 3.2 for scans, 4.7 with colour), before anything is known of it.
 constexpr double kTempBytesPerTriangle = 80, kFileBytesPerTriangle = 5;
-// The same, of what the soup takes: 2.2 to 3.6 times as much. Where there is ample memory it is not coded, and larger.
+// The same where there is ample memory, and nothing is coded.
+constexpr double kPlainTempBytesPerTriangle = 170;
+// The same, of what the soup takes where it is coded: 2.2 to 3.6 times as much.
 constexpr double kTempBytesPerSoupByte = 3.6;
 // What colours from images add in the file; a sample has none.
 constexpr double kImageBytesPerTriangle = 2;
@@ -132,11 +134,14 @@ private:
 
 }  // namespace
 
-uint64_t expectedTempBytes(uint64_t triangles, uint64_t soupBytes, uint64_t imageBytes, uint64_t heldInMemory) {
-    double expected = kTempBytesPerTriangle * double(triangles);
+uint64_t expectedTempBytes(uint64_t triangles, uint64_t soupBytes, uint64_t imageBytes, uint64_t memoryBytes,
+                           bool mayCheckpoint) {
+    const double plain = kPlainTempBytesPerTriangle * double(triangles);
+    const bool isAmple = plain <= double(memoryBytes) / 2;
+    double expected = isAmple ? plain : kTempBytesPerTriangle * double(triangles);
     if (soupBytes > 0) expected = std::min(expected, kTempBytesPerSoupByte * double(soupBytes));
     const uint64_t bytes = uint64_t(expected) + imageBytes;
-    return bytes > heldInMemory ? bytes : 0;
+    return bytes > memoryBytes || mayCheckpoint ? bytes : 0;
 }
 
 uint64_t expectedFileBytes(uint64_t triangles) { return uint64_t(kFileBytesPerTriangle * double(triangles)); }
@@ -258,7 +263,7 @@ Result<BuildEstimate> estimateBuild(const BuildOptions& options) {
     estimate.seconds = reading + figures.seconds * double(m.triangles) + expectedImageSeconds(imageBytes);
     // A checkpoint writes all that is held in memory.
     const bool mayCheckpoint = kSlower * estimate.seconds > options.checkpointSeconds;
-    estimate.tempBytes = expectedTempBytes(m.triangles, 0, imageBytes, mayCheckpoint ? 0 : plan.tempBytes);
+    estimate.tempBytes = expectedTempBytes(m.triangles, 0, imageBytes, plan.tempBytes, mayCheckpoint);
     estimate.freeTempBytes = freeBytesAt(tempFolderOf(options));
     estimate.freeOutputBytes = freeBytesAt(options.output);
     return estimate;

@@ -28,7 +28,9 @@ struct BuildEstimate {
 
 /// Returns the most bytes on the temporary disk, and the bytes of the file, for so many triangles. `imageBytes`: what
 /// images take in the file. `soupBytes`: what the triangles took as they were read; 0: they were not read.
-uint64_t expectedTempBytes(uint64_t triangles, uint64_t soupBytes, uint64_t imageBytes, uint64_t heldInMemory);
+/// `memoryBytes`: what temporary files may hold in memory; what fits goes to the disk only if a checkpoint may be made.
+uint64_t expectedTempBytes(uint64_t triangles, uint64_t soupBytes, uint64_t imageBytes, uint64_t memoryBytes,
+                           bool mayCheckpoint = false);
 uint64_t expectedFileBytes(uint64_t triangles);
 
 /// Returns the free bytes where `path`, or the folder it will be in, lies; the largest number when that is unknown.
