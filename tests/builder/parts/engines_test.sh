@@ -143,7 +143,7 @@ exec "$program" "$@"
 PROGRAM
 chmod +x bin/vcp
 
-"$make_scan" --triangles 60000 --colour -o scan.ply
+"$make_scan" --triangles 600000 --colour -o scan.ply
 "$vcp" build scan.ply -o whole.vcp --progress none >said
 plans() { # plans NAME: plans a build of "a folder/NAME.vcp", whose parts are yet to be stopped and killed
     rm -rf bin/stopped bin/killed
