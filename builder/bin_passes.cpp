@@ -27,6 +27,10 @@ unsigned threadsOf(const BuildOptions& options) {
     return options.threads > 0 ? options.threads : unsigned(std::max(1, tbb::this_task_arena::max_concurrency()));
 }
 
+Result<MemoryPlan> memoryOf(const BuildOptions& options) {
+    return planMemory(options.memoryBytes > 0 ? options.memoryBytes : defaultMemoryBytes(), threadsOf(options));
+}
+
 Result<LevelPlan> planLevels(const BuildOptions& options, const SoupMeasures& measures, uint32_t levelsLess) {
     LevelPlan plan;
     VCP_TRY_ASSIGN(auto frame, chooseFrame(options, measures, levelsLess));

@@ -9,6 +9,7 @@
 #include "builder/build.h"
 #include "builder/level/closed_parts.h"
 #include "builder/level_plan.h"
+#include "builder/memory_plan.h"
 #include "builder/spill/page_spool.h"
 #include "octree/vcp_file.h"
 
@@ -26,6 +27,8 @@ bool mayKeepImages(const BuildOptions& options, const SoupMeasures& measures, st
 
 /// Returns how many threads a build uses.
 unsigned threadsOf(const BuildOptions& options);
+/// Divides the memory that a build may take. Errors: planMemory's.
+Result<MemoryPlan> memoryOf(const BuildOptions& options);
 
 /// Returns the levels of a mesh, with pages of one level at their bottom, and a single bin. Errors: those of
 /// chooseFrame and chooseError.

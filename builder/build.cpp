@@ -1,7 +1,6 @@
 #include "builder/build.h"
 
 #include <algorithm>
-#include <array>
 #include <atomic>
 #include <memory>
 #include <optional>
@@ -109,7 +108,6 @@ private:
             VCP_TRY(read());
         else
             VCP_TRY(resumeMeasures());
-        VCP_TRY(chooseGrid(done_.levelsLess));
         warnOfWideCells();
         if (stage.empty() || stage == "read")
             VCP_TRY(deal());
@@ -214,6 +212,8 @@ private:
     Result<void> reactivate() { return journal_.record(space_.folder(), {{"resumed", true}}); }
 
     Result<void> resumeBins() {
+        levelsLess_ = done_.levelsLess;
+        VCP_TRY_ASSIGN(plan_, planLevels(options_, measures_, levelsLess_));
         plan_.setPages(plan_.frame, FinestPages(plan_.gridOf(plan_.levels() - 1), done_.parted));
         setUpLevels();
         plan_.finest = PagePartition(done_.partition);
@@ -234,13 +234,6 @@ private:
     }
 
     // Reading and dealing
-
-    Result<void> chooseGrid(uint32_t levelsLess) {
-        VCP_TRY_ASSIGN(plan_, planLevels(options_, measures_, levelsLess));
-        plan_.pageBytes = memory_.pageBytes;
-        levelsLess_ = levelsLess;
-        return {};
-    }
 
     void warnOfWideCells() {
         if (auto warning = wideCellWarning(options_, measures_)) report_.warnings.push_back(std::move(*warning));
@@ -276,14 +269,8 @@ private:
         const uint64_t soup = files_.soup->floats.raw().bytes() + files_.soup->doubles.raw().bytes();
         const uint64_t temp = expectedTempBytes(measures_.triangles, soup, images, memory_.tempBytes),
                        there = space_.diskBytes();
-        const std::array<SpaceNeed, 2> needs{
-            {{space_.folder().path(), temp > there ? temp - there : 0, "temporary folder"},
-             {options_.output, expectedFileBytes(measures_.triangles) + images, "folder"}}};
-        auto checked = checkFreeSpace(needs);
-        if (checked) return {};
-        Error error = checked.error();
-        error.file = options_.output.string();
-        return error;
+        return checkBuildSpace({space_.folder().path(), temp > there ? temp - there : 0, "temporary folder"},
+                               options_.output, expectedFileBytes(measures_.triangles) + images);
     }
 
     [[nodiscard]] ColourUse colourUse() const { return colourUseOf(options_, measures_); }
@@ -668,34 +655,19 @@ std::filesystem::path tempFolderOf(const BuildOptions& options) {
     return (options.temp.empty() ? options.output.parent_path() : options.temp) / name;
 }
 
-namespace {
-
-/// Calls work(options, memory, threads), with what the options leave open.
-template <class Work>
-auto withPlan(const BuildOptions& options, const Work& work) -> decltype(work(options, MemoryPlan(), 1u)) {
+Result<BuildReport> buildOctree(const BuildOptions& options) {
     if (options.inputs.empty()) return Error{.code = ErrorCode::Usage, .message = "no input mesh given"};
     if (keepsImages(options) && options.error > 0)
         return Error{.code = ErrorCode::Usage,
                      .message = "images lie on the mesh's own triangles; leave out the error that allows others"};
-    const unsigned threads = threadsOf(options);
-    VCP_TRY_ASSIGN(auto plan,
-                   planMemory(options.memoryBytes > 0 ? options.memoryBytes : defaultMemoryBytes(), threads));
+    VCP_TRY_ASSIGN(const auto memory, memoryOf(options));
     BuildOptions expanded = options;
-    VCP_TRY_ASSIGN(auto inputs, expandInputs(options.inputs));
-    expanded.inputs = std::move(inputs);
-    auto done = work(expanded, plan, threads);
-    if (done || !done.error().file.empty() || done.error().code == ErrorCode::Cancelled) return done;
-    Error error = done.error();
+    VCP_TRY_ASSIGN(expanded.inputs, expandInputs(options.inputs));
+    auto built = Builder(expanded, memory, threadsOf(options), tempFolderOf(expanded)).run();
+    if (built || !built.error().file.empty() || built.error().code == ErrorCode::Cancelled) return built;
+    Error error = built.error();
     error.file = options.inputs.front().string();
     return error;
-}
-
-}  // namespace
-
-Result<BuildReport> buildOctree(const BuildOptions& options) {
-    return withPlan(options, [](const BuildOptions& all, const MemoryPlan& plan, unsigned threads) {
-        return Builder(all, plan, threads, tempFolderOf(all)).run();
-    });
 }
 
 }  // namespace vcp

@@ -229,9 +229,7 @@ json jsonOf(const SoupMeasures& m) {
 
 json jsonOf(const std::vector<SideFile>& files) {
     json pairs = json::array();
-    for (const SideFile& each : files) {
-        pairs.push_back({bytesJson(each.path.native()), each.stamp});
-    }
+    for (const SideFile& each : files) pairs.push_back({bytesJson(each.path.native()), each.stamp});
     return pairs;
 }
 

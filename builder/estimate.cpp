@@ -2,6 +2,7 @@
 
 #include <sys/stat.h>
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <limits>
 #include <thread>
@@ -191,6 +192,15 @@ Result<void> checkFreeSpace(std::span<const SpaceNeed> needs) {
                                             need.folder)};
     }
     return {};
+}
+
+Result<void> checkBuildSpace(const SpaceNeed& temp, const std::filesystem::path& output, uint64_t outputBytes) {
+    const std::array<SpaceNeed, 2> needs{temp, {output, outputBytes, "folder"}};
+    auto checked = checkFreeSpace(needs);
+    if (checked) return {};
+    Error error = checked.error();
+    error.file = output.string();
+    return error;
 }
 
 Result<BuildEstimate> estimateBuild(const BuildOptions& options) {

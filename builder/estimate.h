@@ -45,6 +45,8 @@ struct SpaceNeed {
 
 /// Checks that there is room for all of this at once; needs on the same disk are added up. Errors: Limit.
 Result<void> checkFreeSpace(std::span<const SpaceNeed> needs);
+/// Checks that there is room for a build's temporary files and for `outputBytes` of its output, which the error names.
+Result<void> checkBuildSpace(const SpaceNeed& temp, const std::filesystem::path& output, uint64_t outputBytes);
 
 /// Reads the inputs, and builds a sample among the system's temporary files. Errors: as buildOctree's.
 Result<BuildEstimate> estimateBuild(const BuildOptions& options);

@@ -14,6 +14,7 @@ using PageCounts = std::vector<std::pair<uint64_t, uint64_t>>;
 
 Result<FinestPageChoice> chooseOn(const PagePlanning& planning, const LevelPlan& levels) {
     const MemoryPlan& memory = planning.memory;
+    // Pages of soft leaves must be of one level: their levels come from each other by clustering.
     const PageChoosing choosing{
         .soups = planning.soups,
         .frame = levels.frame,

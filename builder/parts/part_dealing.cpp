@@ -1,7 +1,6 @@
 #include "builder/parts/part_dealing.h"
 
 #include <algorithm>
-#include <array>
 #include <atomic>
 #include <memory>
 #include <optional>
@@ -125,14 +124,9 @@ private:
 
 /// Checks the free space for the stages to come: of a part that finds no room hours have gone by.
 Result<void> checkSpace(const PartSetting& setting, const SoupMeasures& measures, uint64_t imageBytes) {
-    const std::array<SpaceNeed, 2> needs{
-        {{setting.folder, expectedTempBytes(measures.triangles, 0, imageBytes, 0), "folder for the plan"},
-         {setting.plan.options.output, expectedFileBytes(measures.triangles) + imageBytes, "folder"}}};
-    auto checked = checkFreeSpace(needs);
-    if (checked) return {};
-    Error error = checked.error();
-    error.file = setting.plan.options.output.string();
-    return error;
+    return checkBuildSpace(
+        {setting.folder, expectedTempBytes(measures.triangles, 0, imageBytes, 0), "folder for the plan"},
+        setting.plan.options.output, expectedFileBytes(measures.triangles) + imageBytes);
 }
 
 /// Codes the images that the file keeps; records where they are, and what the file has of each material.
@@ -168,7 +162,7 @@ std::vector<InputShare> inputShares(const std::vector<uint64_t>& bytes, unsigned
 
 Result<void> runRead(const PartSetting& setting, unsigned number, NewPart& made) {
     const std::vector<InputShare> shares = sharesOf(setting.plan);
-    VCP_TRY_ASSIGN(const auto memory, setting.divideMemory());
+    VCP_TRY_ASSIGN(const auto memory, memoryOf(setting.plan.options));
     TempSpace& space = made.space(memory.tempBytes);
     Soup soup(space, memory.bufferBytes, setting.plan.parts);
     SoupTally tally;
@@ -206,7 +200,7 @@ Result<void> runCount(const PartSetting& setting, NewPart& made) {
     const BuildOptions& options = setting.plan.options;
     VCP_TRY_ASSIGN(auto read, ReadParts::open(setting, {}));
     VCP_TRY_ASSIGN(const auto measures, measuresOf(read.tally, options));
-    VCP_TRY_ASSIGN(auto memory, setting.divideMemory());
+    VCP_TRY_ASSIGN(auto memory, memoryOf(setting.plan.options));
     const bool withImages = mayKeepImages(options, measures, read.materials);
     VCP_TRY_ASSIGN(const auto plan,
                    planPagesOf({.options = options,

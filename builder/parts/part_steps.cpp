@@ -198,11 +198,6 @@ Result<void> buildAbove(const PartContext& context, unsigned part, TempSpace& sp
 
 }  // namespace
 
-Result<MemoryPlan> PartSetting::divideMemory() const {
-    const uint64_t memory = plan.options.memoryBytes > 0 ? plan.options.memoryBytes : defaultMemoryBytes();
-    return planMemory(memory, threadsOf(plan.options));
-}
-
 Result<void> recordBins(RawBins& bins, const std::string& name, json& files) {
     VCP_TRY(bins.sync());
     const RawBins::Index index = bins.index();
@@ -284,7 +279,7 @@ Result<PartContext> openContext(const PartSetting& setting) {
     LevelPlan& levels = context.levels;
     levels.setPages(levels.frame, FinestPages(levels.gridOf(levels.levels() - 1), recorded.parted));
     levels.finest = PagePartition(recorded.partition);
-    VCP_TRY_ASSIGN(context.memory, setting.divideMemory());
+    VCP_TRY_ASSIGN(context.memory, memoryOf(setting.plan.options));
     VCP_TRY_ASSIGN(context.memory, planPages(context.memory, recorded.pages, levels.finest.bins()));
     levels.pageBytes = context.memory.pageBytes;
     context.hasColour = colourUseOf(context.plan.options, recorded.measures).any();

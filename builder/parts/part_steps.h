@@ -23,8 +23,6 @@ struct PartSetting {
     PartPlan plan;
     const std::function<bool(double)>* progress = nullptr;
 
-    /// Divides the part's memory. Errors: planMemory's.
-    [[nodiscard]] Result<MemoryPlan> divideMemory() const;
     [[nodiscard]] PartName part(const std::string& stage, unsigned number) const { return {folder, stage, number}; }
 };
 

@@ -8,7 +8,7 @@
 //   colours alone count where they differ; then, and where only some primitives have COLOR_0, the rest is white.
 // - Images of the base colour: materials() carries them, with factors of 1, as they are in the vertex colours.
 // - Nothing outside the folder of the file is opened, unless MeshOpenOptions::allowOutside says so.
-// KHR_draco_mesh_compression is decoded as draco.h says,
+// - KHR_draco_mesh_compression is decoded as draco.h says,
 //   EXT_meshopt_compression as gltf_meshopt.h says.
 // - Bounded memory: JSON with its data URIs up to 128 MiB; everything else by window, except that a view that
 //   meshopt compressed is decoded as a whole, within MeshOpenOptions::decoderBytes, and then kept in a temporary

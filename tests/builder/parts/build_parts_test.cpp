@@ -49,9 +49,14 @@ protected:
         std::vector<uint32_t> colours(mesh.positions.size());
         for (uint32_t& colour : colours) colour = uint32_t(random());
         test::writePly(mesh, input(), colours);
-        const auto built = buildOctree(options());
+        buildWhole(options(), whole_);
+    }
+
+    /// Builds in one process; sets `whole` to the bytes of the output, which goes.
+    void buildWhole(const BuildOptions& o, std::string& whole) const {
+        const auto built = buildOctree(o);
         ASSERT_TRUE(built.ok()) << built.error().line();
-        whole_ = bytesOf(output());
+        whole = bytesOf(output());
         fs::remove(output());
     }
 
@@ -317,10 +322,8 @@ TEST_F(BuildParts, OfTilesEachPartDealsItsOwn) {
         o.inputs.push_back(folder_ / ("tile" + std::to_string(tile) + ".ply"));
         test::writePly(part, o.inputs.back(), {});
     }
-    const auto built = buildOctree(o);
-    ASSERT_TRUE(built.ok()) << built.error().line();
-    const std::string whole = bytesOf(output());
-    fs::remove(output());
+    std::string whole;
+    ASSERT_NO_FATAL_FAILURE(buildWhole(o, whole));
     ASSERT_TRUE(planParts(o, 3).ok());
     for (const PartStage& stage : stagesOf(3)) {
         ASSERT_NO_FATAL_FAILURE(runAll(stage.name, stage.parts, 3));
@@ -336,10 +339,8 @@ TEST_F(BuildParts, AnInputThatIsGoneIsMissedByItsOwnPartAlone) {
         o.inputs.push_back(folder_ / ("tile" + std::to_string(tile) + ".ply"));
         test::writePly(test::sphereMesh({30.0 * double(tile), 20, 20}, 9, 40), o.inputs.back());
     }
-    const auto built = buildOctree(o);
-    ASSERT_TRUE(built.ok()) << built.error().line();
-    const std::string whole = bytesOf(output());
-    fs::remove(output());
+    std::string whole;
+    ASSERT_NO_FATAL_FAILURE(buildWhole(o, whole));
     ASSERT_TRUE(planParts(o, 2).ok());
     ASSERT_TRUE(run("read", 0).ok());
     fs::remove(o.inputs[0]);
@@ -392,10 +393,8 @@ TEST_F(BuildParts, WhatAMeshNamesMayNotChangeMeanwhile) {
     std::ofstream(material) << "newmtl paint\nKd 1 0 0\nKe nan nan nan\nmap_Ke missing.png\n";
     BuildOptions o = options();
     o.inputs = {mesh};
-    const auto built = buildOctree(o);
-    ASSERT_TRUE(built.ok()) << built.error().line();
-    const std::string whole = bytesOf(output());
-    fs::remove(output());
+    std::string whole;
+    ASSERT_NO_FATAL_FAILURE(buildWhole(o, whole));
     ASSERT_TRUE(planParts(o, 1).ok());
     ASSERT_TRUE(run("read", 0).ok());
     const std::string before = bytesOf(material);

@@ -1,5 +1,7 @@
 // vcp bench colour: the surface's colours that are drawn, without light, against those of the textured mesh itself, 64
-// XX//
+// samples a pixel, beside what they cost (docs/measuring.md). Cameras: `whole`, `half` and `close` of bench_cameras.h,
+// and `dive`, its steps from `whole` to a cell of 200 pixels.
+//
 // Methods: `certified`, the renderer, with the pixel error as its knob; `vertex`, the mesh with a colour at each
 // vertex; `texture`, the textured mesh with as many samples a pixel as `certified` has: the least that any picture of
 // so many samples differs by.
