@@ -10,6 +10,7 @@ const kSettings = {
     'webgl.force-enabled': true,
     'browser.shell.checkDefaultBrowser': false,
     'datareporting.policy.dataSubmissionEnabled': false,
+    'security.sandbox.content.level': 0, // containers often allow none
 };
 
 export class Firefox {
@@ -20,8 +21,13 @@ export class Firefox {
         fs.mkdirSync(this.profile, { recursive: true });
         fs.writeFileSync(path.join(this.profile, 'user.js'), Object.entries({ ...kSettings, ...settings })
             .map(([name, value]) => `user_pref("${name}", ${JSON.stringify(value)});\n`).join(''));
+        // It refuses a home of another user and one that it can't write to.
+        const home = Object.fromEntries(['HOME', 'XDG_CACHE_HOME', 'XDG_CONFIG_HOME', 'XDG_RUNTIME_DIR'].map(name => [name, this.profile]));
+        this.log = path.join(this.profile, 'said');
+        const said = fs.openSync(this.log, 'w');
         this.process = spawn('firefox-esr', ['--headless', '--no-remote', '--marionette', '--remote-allow-system-access', '--profile', this.profile,
-            'about:blank'], { stdio: 'ignore' });
+            'about:blank'], { stdio: ['ignore', said, said], env: { ...process.env, ...home } });
+        fs.closeSync(said);
         this.answers = new Map();
         this.sent = 0;
         this.process.on('exit', code => {
@@ -33,10 +39,11 @@ export class Firefox {
         for (const { fail } of this.answers.values()) fail(error);
     }
 
+    /// Errors: it does not start; what it said then is part of the message.
     async connect() {
         const file = path.join(this.profile, 'MarionetteActivePort'), port = () => Number(fs.existsSync(file) && fs.readFileSync(file, 'utf8'));
         for (const end = Date.now() + 300e3; !port(); await new Promise(done => setTimeout(done, 50)))
-            if (this.hasEnded || Date.now() > end) throw new Error('Firefox does not start');
+            if (this.hasEnded || Date.now() > end) throw new Error(`Firefox does not start: ${fs.readFileSync(this.log, 'utf8')}`);
         this.socket = net.connect(port(), '127.0.0.1');
         let bytes = Buffer.alloc(0);
         this.socket.on('data', piece => {
@@ -105,7 +112,7 @@ class Page {
         return (await this.browser.call('WebDriver:ExecuteScript', { script, args: [expression] })).value;
     }
     /// Waits until an expression of the page is true. Errors: it is not after `mostMs`.
-    async until(expression, mostMs = 60e3) {
+    async until(expression, mostMs = 240e3) {
         for (const end = Date.now() + mostMs; Date.now() < end;) {
             if (await this.evaluate(expression).catch(() => false)) return;
             await new Promise(done => setTimeout(done, 50));

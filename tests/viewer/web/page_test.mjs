@@ -77,6 +77,10 @@ if (!published.includes(kHears)) fs.writeFileSync(pageFile, published.replace('<
 
 const browser = new { chromium: Browser, firefox: Firefox }[browserName](path.join(pictures, 'profile'));
 process.on('exit', () => browser.process.kill('SIGKILL'));
+await browser.connect?.().catch(error => {
+    console.log(`${error.message}: skipped`);
+    process.exit(77);
+});
 
 /// Opens the page and waits until it has settled or shows a problem.
 async function open(width, height, { fault = '', link = '', touch = false, site = address } = {}) {
