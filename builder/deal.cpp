@@ -139,11 +139,12 @@ LatticeBox boxOf(const PageCounts& pages, PageGrid base, double marginCells) {
     return box;
 }
 
-/// Counts a triangle, on the base level's lattice, for every page that will need it, or for the parts of some pages:
-/// near enough for a count.
+/// Counts a triangle for every page that will need it, or for the parts of some pages: near enough for a count. As long
+/// as it is not known which pages are parted, triangles are whole and lie on the base level's lattice.
 struct CountVisit {
     const FinestPages& pages;
     double marginCells;
+    uint32_t lattice;          ///< the level whose lattice triangles lie on
     const PageCounts& parted;  ///< the pages whose parts are counted; none: all pages are
     LatticeBox box;            ///< around them
     PageCounts& counts;
@@ -152,10 +153,10 @@ struct CountVisit {
 
     Result<void> operator()(const LatticeTriangle& t, const std::optional<TexturedTriangle>&) {
         if (!parted.empty() && !box.touches(t)) return {};
-        pages.forPagesNear(t.corner, marginCells, pages.base(), [&](uint32_t level, uint64_t code) {
+        pages.forPagesNear(t.corner, marginCells, lattice, [&](uint32_t level, uint64_t code) {
             if (!parted.empty() && (level == pages.base() || !parted.contains({level - 1, code >> 3}))) return;
             const auto [count, isNew] = counts.try_emplace({level, code}, 0);
-            ++count->second;
+            count->second += piecesIn(t, level);
             if (isNew) ++counted;
         });
         if (counted > mostPages)
@@ -163,21 +164,51 @@ struct CountVisit {
         return {};
     }
     static Result<void> finish() { return {}; }
+
+private:
+    /// Returns into how many pieces a page will have a whole triangle cut, at least.
+    [[nodiscard]] uint64_t piecesIn(const LatticeTriangle& t, uint32_t level) const {
+        const auto& [a, b, c] = t.corner;
+        const glm::dvec3 edges[3] = {glm::dvec3(a) - glm::dvec3(b), glm::dvec3(b) - glm::dvec3(c),
+                                     glm::dvec3(c) - glm::dvec3(a)};
+        const double most = std::ldexp(double(kPartedEdgeCells) * kLatticePerCell, int(lattice) - int(level));
+        const auto isLong = [&](const glm::dvec3& edge) { return glm::dot(edge, edge) > most * most; };
+        return level > lattice && std::ranges::any_of(edges, isLong) ? kLeastPieces : 1;
+    }
+
+    // A needle has two long edges.
+    static constexpr uint64_t kLeastPieces = 3;
 };
 
-Result<PageCounts> countTriangles(const PageChoosing& choosing, const FinestPages& pages, const PageCounts& parted,
+/// Counts triangles, snapped to some lattice, by pages. `parted`: as CountVisit's.
+Result<PageCounts> countTriangles(const PageChoosing& choosing, const LatticeSnapper& snapper, uint32_t lattice,
+                                  const FinestPages& pages, const PageCounts& parted,
                                   const std::function<bool(double)>& progress) {
-    const LatticeSnapper snapper(choosing.frame, nullptr, false);
     const LatticeBox box = boxOf(parted, pages.gridOf(pages.base()), choosing.marginCells);
     tbb::enumerable_thread_specific<PageCounts> parts;
     std::atomic<uint64_t> counted = 0;
     VCP_TRY(forLatticeTriangles(choosing.soups, snapper, false, progress, [&] {
-        return CountVisit{pages, choosing.marginCells, parted, box, parts.local(), counted, choosing.mostPages};
+        return CountVisit{pages, choosing.marginCells, lattice, parted,
+                          box,   parts.local(),        counted, choosing.mostPages};
     }));
     PageCounts sums;
     for (const PageCounts& part : parts)
         for (const auto& [page, count] : part) sums[page] += count;
     return sums;
+}
+
+/// Counts the whole triangles.
+Result<PageCounts> countWhole(const PageChoosing& choosing, const FinestPages& pages, const PageCounts& parted,
+                              const std::function<bool(double)>& progress) {
+    return countTriangles(choosing, LatticeSnapper(choosing.frame, nullptr, false), pages.base(), pages, parted,
+                          progress);
+}
+
+/// Counts the pieces that the pages will hold.
+Result<PageCounts> countPieces(const PageChoosing& choosing, const FinestPages& pages,
+                               const std::function<bool(double)>& progress) {
+    const GridFrame frame = choosing.frame.withLevelsBelow(pages.deepest() - pages.base());
+    return countTriangles(choosing, LatticeSnapper(frame, nullptr, false, pages), pages.deepest(), pages, {}, progress);
 }
 
 /// Which pages are parted, found by parting those that hold too much, again and again.
@@ -337,19 +368,23 @@ Result<FinestPageChoice> choosePages(const PageChoosing& choosing) {
         choosing.mostLevelsBelow > 0 ? std::min(choosing.uncounted, kMostPageTriangles) : choosing.uncounted;
     FinestPageChoice choice{parting.pages(), {}};
     if (triangles <= uncounted && !choosing.mayBeCoarser) return choice;
-    for (int round = 0;; ++round) {
-        // Each round takes half of what is left of the progress.
-        const double left = std::ldexp(1.0, -round);
-        VCP_TRY_ASSIGN(const auto parts, countTriangles(choosing, choice.pages, parting.partedLast(), [&](double part) {
-                           return choosing.progress(1 - left + left / 2 * part);
-                       }));
-        if (round == 0 && choosing.mayBeCoarser) choice.levelsLess = levelsTooMany(parts, triangles);
+    PageCounts counts;
+    // Each count takes half of what is left of the progress.
+    double left = 1;
+    const auto progress = [&](double part) { return choosing.progress(1 - left + left / 2 * part); };
+    for (bool goesOn = true; goesOn; left /= 2) {
+        VCP_TRY_ASSIGN(counts, countWhole(choosing, choice.pages, parting.partedLast(), progress));
+        if (left == 1 && choosing.mayBeCoarser) choice.levelsLess = levelsTooMany(counts, triangles);
         if (choice.levelsLess > 0) return choice;
-        const bool goesOn = parting.improve(parts);
+        goesOn = parting.improve(counts);
         choice.pages = parting.pages();
-        if (!goesOn) break;
     }
-    for (const auto& [page, count] : parting.counts())
+    if (choice.pages.isUniform()) {
+        counts = parting.counts();
+    } else {
+        VCP_TRY_ASSIGN(counts, countPieces(choosing, choice.pages, progress));
+    }
+    for (const auto& [page, count] : counts)
         choice.counts.emplace_back(choice.pages.firstCode(page.first, page.second), count);
     std::sort(choice.counts.begin(), choice.counts.end());
     return choice;

@@ -16,9 +16,6 @@ namespace {
 /// Returns the middle of two colours, channel by channel.
 uint32_t middleColour(uint32_t a, uint32_t b) { return (a & b) + (((a ^ b) & 0xfefefefeu) >> 1); }
 
-/// Returns the multiple of a power of two that is nearest to a point, which has no negative coordinates.
-glm::i32vec3 roundTo(glm::dvec3 p, int step) { return glm::i32vec3(p / double(step) + 0.5) * step; }
-
 bool isKnown(glm::dvec3 normal) { return normal != glm::dvec3(0); }
 
 /// Returns whether a triangle has normals of its own, and these, on the side of the facet.
@@ -65,9 +62,7 @@ LatticeSnapper::Point LatticeSnapper::pointOf(const Piece& piece, int corner) {
 
 LatticeSnapper::Point LatticeSnapper::middle(const Point& a, const Point& b) const {
     const glm::dvec3 exact = (glm::dvec3(a.at) + glm::dvec3(b.at)) / 2.0;
-    glm::i32vec3 at(glm::floor(exact));
-    const int step = pages_.stepAt(at);
-    if (step > 1) at = roundTo(exact, step);
+    const auto [at, step] = pages_.placeOf(exact, glm::i32vec3(glm::floor(exact)));
     return {at,
             (a.moved + b.moved) / 2.0 + (glm::dvec3(at) - exact),
             step,
@@ -170,9 +165,9 @@ LatticeSnapper::Piece LatticeSnapper::snap(const WorldTriangle<Real>& triangle) 
     for (int i = 0; i < 3; ++i) {
         const glm::dvec3 q =
             glm::clamp((glm::dvec3(triangle.corner[i]) - origin_) * scale_, glm::dvec3(0), glm::dvec3(2147483647.0));
-        t.corner[i] = roundTo(q, 1);
-        piece.step[i] = pages_.stepAt(t.corner[i]);
-        if (piece.step[i] > 1) t.corner[i] = roundTo(q, piece.step[i]);
+        const auto [at, step] = pages_.placeOf(q, glm::i32vec3(q + 0.5));
+        t.corner[i] = at;
+        piece.step[i] = step;
         piece.moved[i] = glm::dvec3(t.corner[i]) - q;
         t.colour[i] = triangle.colour[i];
         piece.uv[i] = triangle.uv[i];

@@ -102,7 +102,7 @@ struct PageWork {
 PageWork foretoldWork(const LevelSettings& settings, const LatticeMesh& mesh, std::span<const uint32_t> triangles,
                       bool withSurface) {
     const uint64_t count = triangles.size();
-    const auto records = uint64_t(kMostRepetition * double(count));
+    const auto records = uint64_t(mostRepetitionOf(count) * double(count));
     const uint64_t exact = settings.exact ? exactPageWorkBytes(count, mostVertices(mesh, triangles), records) : 0;
     if (settings.exact && !withSurface) return {exact};
     const double margin = settings.exact ? kExactMarginCells : kBinMarginCells;

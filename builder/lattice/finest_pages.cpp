@@ -3,7 +3,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include <glm/geometric.hpp>
 #include <glm/gtc/type_precision.hpp>
+
+#include "builder/lattice/lattice_mesh.h"
 
 namespace vcp {
 
@@ -70,7 +73,7 @@ void FinestPages::addLevels(uint32_t level, uint32_t number, const glm::i64vec3&
                           low, high, levels);
 }
 
-FinestPages::Levels FinestPages::levelsAround(glm::i32vec3 p, int64_t reach) const {
+FinestPages::Levels FinestPages::levelsAround(glm::i32vec3 p, glm::i64vec3 reach) const {
     const int bits = log2PageSteps(base());
     const glm::i64vec3 low = glm::i64vec3(p) - reach, high = glm::i64vec3(p) + reach;
     // A page holds its walls.
@@ -92,28 +95,41 @@ FinestPages::Levels FinestPages::levelsAround(glm::i32vec3 p, int64_t reach) con
 
 int FinestPages::stepAt(glm::i32vec3 p) const {
     if (isUniform()) return 1;
-    const Levels here = levelsAround(p, 0);
+    const Levels here = levelsAround(p, glm::i64vec3(0));
     uint32_t coarsest = here.coarsest;
     if (coarsest > base()) {
-        // A cell more than the longest edge, since rounding moves the ends.
-        const int64_t reach = int64_t{kPartedEdgeCells + 1}
-                              << (PageGrid::kLog2LatticePerCell + deepest() - here.deepest);
-        coarsest = levelsAround(p, reach).coarsest;
+        // A cell more than the longest edge: pages take what is a step of their lattice away as well.
+        coarsest = levelsAround(p, glm::i64vec3(stepsOf(kPartedEdgeCells + 1, here.deepest))).coarsest;
     }
     return 1 << (deepest() - coarsest);
 }
 
+FinestPages::Place FinestPages::placeOf(glm::dvec3 point, glm::i32vec3 at) const {
+    // Rounding may move it nearer to a page that is coarser still.
+    int step = 1;
+    for (int here; (here = stepAt(at)) > step; step = here) at = glm::i32vec3(point / double(here) + 0.5) * here;
+    return {at, step};
+}
+
 bool FinestPages::isTooLong(glm::i32vec3 a, glm::i32vec3 b) const {
     if (isUniform()) return false;
-    const glm::dvec3 d = glm::dvec3(a) - glm::dvec3(b);
-    const double length = glm::length(d);
-    const auto longest = [&](uint32_t level) {
-        return std::ldexp(double(kPartedEdgeCells), int(PageGrid::kLog2LatticePerCell + deepest() - level));
+    const double length = glm::length(glm::dvec3(a) - glm::dvec3(b));
+    const auto exceeds = [&](int cells, uint32_t level) {
+        return level > base() && length > double(stepsOf(cells, level));
     };
-    if (length <= longest(deepest())) return false;
-    const glm::i32vec3 middle((glm::i64vec3(a) + glm::i64vec3(b)) >> int64_t{1});
-    const uint32_t level = levelsAround(middle, int64_t(length) + 2).deepest;
-    return level > base() && length > longest(level);
+    if (!exceeds(kPartedEdgeCells, deepest())) return false;
+    const glm::i64vec3 from(a), to(b);
+    // A fourth of its length around the edge: so what is cut from an edge that may stay is never cut further without
+    // end.
+    constexpr int kParts = 4;
+    const glm::i64vec3 reach = glm::abs(to - from) / int64_t{2 * kParts} + int64_t(length / 4) + int64_t{2};
+    for (int i = 1; i < 2 * kParts; i += 2) {
+        const glm::i64vec3 middle = (from * int64_t{2 * kParts - i} + to * int64_t{i}) / int64_t{2 * kParts};
+        if (exceeds(kPartedEdgeCells, levelsAround(glm::i32vec3(middle), reach).deepest)) return true;
+    }
+    if (!exceeds(kMaxEdgeCells, deepest())) return false;
+    const glm::i32vec3 middle((from + to) >> int64_t{1});
+    return exceeds(kMaxEdgeCells, levelsAround(middle, glm::i64vec3(int64_t(length) + 2)).deepest);
 }
 
 }  // namespace vcp

@@ -4,10 +4,13 @@
 // All triangles lie on one lattice, the deepest level's. A page of a coarser level needs vertices that lie on its own,
 // coarser lattice, and a triangle that several pages hold must be the same in all of them, or rays would slip through
 // between. So:
-//   - near pages below the base level no edge is longer than kPartedEdgeCells of their cells (longest edges of a
-//     triangle lie within their own length of all of it, so this depends on the edge alone);
-//   - a vertex lies on the lattice of the coarsest page within that reach (stepAt).
-// A triangle then has its corners on the lattice of every page that it touches.
+//   - beside a page below the base level, within a fourth of its length, no edge is longer than kPartedEdgeCells of the
+//     page's cells. So a triangle lies within that reach of each of its corners in such a page;
+//   - a vertex lies on the lattice of the coarsest page within that reach (stepAt);
+//   - near any page no edge is longer than kMaxEdgeCells of its cells. A triangle lies within the length of its longest
+//     edge of this one's middle.
+// All of this depends on vertices and edges alone, so that neighbours agree. A triangle then has its corners on the
+// lattice of every page that it touches.
 #pragma once
 
 #include <array>
@@ -21,7 +24,7 @@
 
 namespace vcp {
 
-/// Longest edge of a triangle that touches a page below the base level, in cells of that page.
+/// Longest edge beside a page below the base level, in cells of that page.
 inline constexpr int kPartedEdgeCells = 16;
 
 class FinestPages {
@@ -53,6 +56,13 @@ public:
     /// Returns the distance between neighbouring vertices around a point, in steps of the deepest level's lattice:
     /// vertices lie on multiples of it.
     [[nodiscard]] int stepAt(glm::i32vec3 p) const;
+    /// A place for a vertex, and the distance to its neighbours there.
+    struct Place {
+        glm::i32vec3 at;
+        int step;
+    };
+    /// Returns the place for a vertex at a point without negative coordinates; `at`: the point on the deepest lattice.
+    [[nodiscard]] Place placeOf(glm::dvec3 point, glm::i32vec3 at) const;
     /// Whether the edge between two points is too long for a page near it.
     [[nodiscard]] bool isTooLong(glm::i32vec3 a, glm::i32vec3 b) const;
 
@@ -66,11 +76,15 @@ private:
 
     /// Returns the number of a page of the base level, or kWhole.
     [[nodiscard]] uint32_t numberOf(uint64_t code) const;
-    /// Returns the levels of the pages that touch the box of half edge `reach` around a point.
-    [[nodiscard]] Levels levelsAround(glm::i32vec3 p, int64_t reach) const;
+    /// Returns the levels of the pages that touch the box of half edges `reach` around a point.
+    [[nodiscard]] Levels levelsAround(glm::i32vec3 p, glm::i64vec3 reach) const;
     /// Adds the levels of the pages in page `number`, at `corner`, that touch a box.
     void addLevels(uint32_t level, uint32_t number, const glm::i64vec3& corner, const glm::i64vec3& low,
                    const glm::i64vec3& high, Levels& levels) const;
+    /// Returns so many cells of a level, in steps.
+    [[nodiscard]] int64_t stepsOf(int cells, uint32_t level) const {
+        return int64_t{cells} << (PageGrid::kLog2LatticePerCell + deepest() - level);
+    }
     [[nodiscard]] int log2PageSteps(uint32_t level) const {
         return int(grid_.log2Cells + PageGrid::kLog2LatticePerCell + deepest() - level);
     }

@@ -59,10 +59,11 @@ public:
         // Long leaves have a record more than triangles.
         constexpr double kNamed = double(kHardCountLong) / (kHardCountLong + 1);
         const auto count = double(std::max<size_t>(inside.size(), 1));
-        mostRepetition_ = std::min(kMostRepetition, double(mostRecords_) * kNamed / count);
+        const double most = mostRepetitionOf(inside.size());
+        mostRepetition_ = std::min(most, double(mostRecords_) * kNamed / count);
         tree_.nodes.emplace_back();
         build(0, whole, inside, 1, 0);
-        splitCrowded(std::min(kMostRepetition * kNamed, mostRepetition_) * count);
+        splitCrowded(std::min(most * kNamed, mostRepetition_) * count);
         return std::move(tree_);
     }
 

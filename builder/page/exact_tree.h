@@ -17,6 +17,9 @@ inline constexpr size_t kWideLeafTriangles = 4;
 /// No leaf is split where a triangle would be named more often than this: so a page's leaves name at most so many times
 /// its triangles, however they lie.
 inline constexpr double kMostRepetition = 12;
+/// Of a page with more triangles than any that is parted, which they are in heaps only, leaves name no more than this,
+/// or its triangles twice.
+inline constexpr uint64_t kManyRecords = 12 << 17;
 /// Leaves with more triangles than this, which were left so large for that reason, are split all the same, the fullest
 /// first, as long as the whole page keeps to it.
 inline constexpr size_t kCrowdedLeafTriangles = 64;
@@ -33,9 +36,15 @@ inline constexpr double kExactMarginCells = 1.0 / kLatticePerCell;
 PageTree buildExactTree(const LatticeMesh& mesh, std::span<const uint32_t> triangles, glm::u32vec3 page,
                         uint32_t log2Cells, size_t mostRecords = kLeafIndexMask);
 
+/// Returns how often a page's leaves may name its triangles, in the mean.
+constexpr double mostRepetitionOf(uint64_t triangles) {
+    const double many = double(kManyRecords) / double(triangles > 0 ? triangles : 1);
+    return many < 2 ? 2 : many < kMostRepetition ? many : kMostRepetition;
+}
+
 /// Returns the bytes that a page needs while it is built and coded, measured: of triangles, their vertices (those with
-/// several normals or places in images count for each) and their records, which are kMostRepetition a triangle at most.
-/// A tree alone needs less.
+/// several normals or places in images count for each) and their records, which are mostRepetitionOf a triangle at
+/// most. A tree alone needs less.
 constexpr uint64_t exactPageWorkBytes(uint64_t triangles, uint64_t vertices, uint64_t records) {
     return (6 << 20) + 60 * triangles + 150 * vertices + 30 * records;
 }

@@ -299,6 +299,26 @@ TEST_F(Build, CrowdedPlacesHaveFinerPages) {
     EXPECT_TRUE(contentOf(o.output) == bytes);
 }
 
+TEST_F(Build, NeedlesInACrowdedPlaceStayWholeAndFitTheMemory) {
+    // A bundle of needles, each a thousand times as long as it is wide, beside a box.
+    IndexedMesh mesh = test::boxMesh({0, 0, 0}, {1, 1, 1}, 60);
+    std::mt19937_64 random(3);
+    std::uniform_real_distribution<double> in(0, 1);
+    for (int k = 0; k < 300'000; ++k) {
+        const glm::dvec3 at(0.5 + 0.002 * in(random), 0.5 + 0.002 * in(random), 0.6 + 0.06 * in(random));
+        const uint32_t first = uint32_t(mesh.positions.size());
+        for (const glm::dvec3 aside : {glm::dvec3(0), glm::dvec3(0, 0, 0.02), glm::dvec3(2e-5, 1e-5, 0)})
+            mesh.positions.push_back(at + aside);
+        mesh.triangles.push_back({first, first + 1, first + 2});
+    }
+    roundToFloat(mesh);
+    BuildOptions o = options({ply(mesh)});
+    o.memoryBytes = 320 << 20;
+    const auto built = buildOctree(o);
+    ASSERT_TRUE(built.ok()) << built.error().line();
+    EXPECT_LT(built->fileBytes, 12 * built->triangles);
+}
+
 TEST_F(Build, ADensePageFitsTheLeastMemory) {
     // As many triangles as a page may hold, and long: what leaves may name, and pieces, would not fit.
     IndexedMesh mesh = test::torusMesh({0, 0, 0}, 10, 4, 1000, 65);

@@ -107,8 +107,7 @@ TEST(FinestPages, CornersLieOnTheLatticeOfEveryPageThatTheirTriangleTouches) {
                 for (int i = 0; i < 3; ++i) {
                     for (int axis = 0; axis < 3; ++axis) ASSERT_EQ(t.corner[i][axis] & ((1 << coarser) - 1), 0);
                     const glm::dvec3 edge(t.corner[i] - t.corner[(i + 1) % 3]);
-                    const double cells = glm::length(edge) / std::ldexp(double(kLatticePerCell), coarser);
-                    ASSERT_LE(cells, level > kBase.level ? kPartedEdgeCells : 256);
+                    ASSERT_LE(glm::length(edge) / std::ldexp(double(kLatticePerCell), coarser), kMaxEdgeCells);
                 }
             });
         EXPECT_GT(touched.size(), 1u) << seed;
@@ -116,6 +115,17 @@ TEST(FinestPages, CornersLieOnTheLatticeOfEveryPageThatTheirTriangleTouches) {
         EXPECT_EQ(test::edgeUses(lattice.triangles), (std::map<int, int>{{2, int(lattice.triangles.size() * 3 / 2)}}))
             << "a crack opens between pages";
     }
+}
+
+TEST(FinestPages, OnlyEdgesBesidePartedPagesAreCut) {
+    // One page of 64 cells, from 64 to 128 along each axis, is parted twice at its lowest corner.
+    const FinestPages pages(kBase, {{}, {8 * 7}});
+    const int cell = kLatticePerCell << (pages.deepest() - pages.base());
+    const auto edge = [&](glm::ivec3 from, glm::ivec3 to) { return pages.isTooLong(from * cell, to * cell); };
+    EXPECT_FALSE(edge({140, 70, 70}, {180, 70, 70})) << "beside it, farther than a fourth of its length";
+    EXPECT_TRUE(edge({66, 66, 66}, {106, 66, 66})) << "an end is in it";
+    EXPECT_TRUE(edge({40, 66, 66}, {90, 66, 66})) << "it goes through";
+    EXPECT_FALSE(edge({66, 66, 66}, {69, 66, 66})) << "no longer than 16 of its cells";
 }
 
 TEST(FinestPages, NoCornerIsFartherFromTheMeshThanItsStray) {
