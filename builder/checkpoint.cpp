@@ -16,7 +16,7 @@ namespace {
 using nlohmann::json;
 
 // Version of the temporary files; a build does not continue from another version's.
-constexpr int kTempVersion = 19;
+constexpr int kTempVersion = 20;
 
 json jsonOf(glm::dvec3 v) { return {v.x, v.y, v.z}; }
 
