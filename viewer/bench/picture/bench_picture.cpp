@@ -229,6 +229,7 @@ private:
         row.flipMean += share * sum / double(differences.size());
         row.flipP99 = std::max(row.flipP99, quantile(std::move(differences), 0.99));
         row.isolatedPixels += isolatedPixels(picture, camera).size();
+        row.isolatedInMesh += isolatedPixels(reference, camera).size();
         const SilhouetteDifference silhouette = silhouetteDifference(reference, picture);
         row.silhouettePixels += silhouette.pixels;
         takeWorse(row.silhouetteDistance, silhouette.distancePixels);

@@ -28,6 +28,7 @@ Json toJson(const BenchPictureRow& row) {
             {"flip_mean", row.flipMean},
             {"flip_p99", row.flipP99},
             {"isolated_pixels", row.isolatedPixels},
+            {"isolated_in_mesh", row.isolatedInMesh},
             {"silhouette_pixels", row.silhouettePixels},
             {"silhouette_p50_px", row.silhouetteDistance.p50},
             {"silhouette_p95_px", row.silhouetteDistance.p95},

@@ -49,7 +49,7 @@ TEST_F(BenchPicture, RowsHaveTheFieldsThatProgramsRelyOn) {
     for (const Json& row : rows) {
         for (const char* field :
              {"model", "camera", "method", "knob", "rmse", "flip_mean", "flip_p99", "isolated_pixels",
-              "silhouette_p95_px", "silhouette_pixels", "normal_p50_degrees", "normal_p95_degrees",
+              "isolated_in_mesh", "silhouette_p95_px", "silhouette_pixels", "normal_p50_degrees", "normal_p95_degrees",
               "normal_p99_degrees", "cpu_ms", "bytes_read", "resident_bytes", "coarsest_level", "finest_level"})
             EXPECT_TRUE(row.contains(field)) << field;
         cameras.insert(row["camera"]);
