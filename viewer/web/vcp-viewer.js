@@ -9,7 +9,7 @@ const kOcclusionRays = 8; // a pixel
 const kRestMs = 160; // without a movement: the view is at rest
 const kSaidMs = 4000; // a line that answers a button stands as long
 const kTapMs = 300, kTapPixels = 24; // two taps so near each other are one double tap
-const kMostPixels = 1.6e6;
+const kMostPixels = 1.6e6, kMostSide = 16384; // of pictures
 const kColourError = 6; // ΔE that may be seen, where nothing else is asked for
 const kPhoneBudget = 64 << 20, kBudget = 192 << 20; // of decoded pages, in all workers
 const kWorkerBudget = 32 << 20, kLeastShare = 1 << 20; // of the budget for each worker more; of what it holds of pages
@@ -94,7 +94,8 @@ export class VcpViewer extends HTMLElement {
         this.resizing.observe(this);
         this.onHidden = () => this.worker?.postMessage({ type: 'hide', hidden: document.hidden });
         document.addEventListener('visibilitychange', this.onHidden);
-        this.onOnline = () => this.worker?.postMessage({ type: 'retry' });
+        // What could not even be opened is begun anew.
+        this.onOnline = () => (this.info || !this.problems.scan ? this.worker?.postMessage({ type: 'retry' }) : this.open());
         addEventListener('online', this.onOnline);
         this.chooseTheme();
         this.light.fromText(this.getAttribute('light') ?? '');
@@ -287,8 +288,8 @@ export class VcpViewer extends HTMLElement {
     look(moving) {
         if (!this.info || !this.worker || this.clientWidth === 0) return;
         const dense = Math.min(devicePixelRatio || 1, 2);
-        const pixels = this.clientWidth * this.clientHeight * dense * dense;
-        const scale = dense * Math.min(1, Math.sqrt(kMostPixels / pixels)) * (moving ? this.movingScale : 1);
+        const pixels = this.clientWidth * this.clientHeight * dense * dense, side = Math.max(this.clientWidth, this.clientHeight) * dense;
+        const scale = dense * Math.min(1, Math.sqrt(kMostPixels / pixels), kMostSide / side) * (moving ? this.movingScale : 1);
         const width = Math.max(1, Math.round(this.clientWidth * scale)), height = Math.max(1, Math.round(this.clientHeight * scale));
         const colourError = numberOf(this.getAttribute('colour-error'), kColourError);
         const { up, forward } = this.orbit.axes(), mode = kModes[this.mode] ?? 0, theme = kTheme[this.dataset.theme];

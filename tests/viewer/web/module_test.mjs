@@ -269,6 +269,38 @@ await check('servers that do wrong end in one line', async () => {
     await says(answer => new Response(answer.body, { status: 206 }), /hides Content-Range/, 1);
 });
 
+await check('a connection of which nothing is heard any more is given up, a slow one is not', async () => {
+    const slow = quick(new Ranges('scan.vcp', async (url, { headers, signal }) => {
+        const answer = await server(file)(url, { headers }), bytes = new Uint8Array(await answer.arrayBuffer());
+        let at = 0;
+        const body = new ReadableStream({ async pull(to) {
+            await new Promise(done => setTimeout(done, 30));
+            assert.ok(!signal.aborted);
+            to.enqueue(bytes.subarray(at, at += 20));
+            if (at >= bytes.length) to.close();
+        } });
+        return new Response(body, answer);
+    }));
+    slow.silentMs = 200;
+    assert.ok(Buffer.from(await slow.read(0, 500)).equals(file.subarray(0, 500)));
+    assert.deepEqual([slow.requests, slow.bytes], [1, 500]);
+    // One says nothing at all, the other one stops half-way.
+    const silent = (url, { signal }) => new Promise((_, fail) => signal.addEventListener('abort', () => fail(signal.reason)));
+    const stops = async (url, { headers, signal }) => new Response(new ReadableStream({ start(to) {
+        to.enqueue(new Uint8Array(10));
+        signal.addEventListener('abort', () => to.error(signal.reason));
+    } }), await server(file)(url, { headers }));
+    for (const fetch of [silent, stops]) {
+        const ranges = quick(new Ranges('scan.vcp', fetch));
+        ranges.silentMs = 20;
+        await assert.rejects(ranges.read(0, 100), /^Error: scan.vcp: the server does not answer$/);
+        assert.equal(ranges.requests, 4);
+        // It answers again.
+        ranges.fetch = server(file);
+        assert.ok(Buffer.from(await ranges.read(0, 100)).equals(file.subarray(0, 100)));
+    }
+});
+
 await check('a small file is asked for once', async () => {
     const ranges = quick(new Ranges('scan.vcp', server(file.subarray(0, 1000))));
     assert.equal((await ranges.read(0, 64 << 10)).length, 1000);

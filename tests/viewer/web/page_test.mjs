@@ -1,7 +1,8 @@
-// A published page in a headless browser: page_test.mjs chromium|firefox VCP FOLDER PICTURES [images|shards|short]
+// A published page in a headless browser: page_test.mjs chromium|firefox VCP FOLDER PICTURES [images|package|shards|short]
 // FOLDER: as `vcp publish` makes it. PICTURES: folder for what is seen. images: the scan is textured_scene.mjs', without
 // loss, and the folder has it with JPEGs as well, as jpeg.vcp; what concerns images is tested. shards: the scan is in shards,
-// and the folder has it as the one file as well, as whole.vcp. short: what browsers may do otherwise.
+// and the folder has it as the one file as well, as whole.vcp. package: the
+// viewer is in node_modules. short: what browsers may do otherwise.
 import assert from 'node:assert/strict';
 import { execFileSync, spawn } from 'node:child_process';
 import fs from 'node:fs';
@@ -16,7 +17,8 @@ import { compareColours, compareDepth, readDepth, readPicture } from './native_p
 
 const [browserName, vcp, folder, pictures, kind] = process.argv.slice(2);
 // Read as a module whatever the nearest package.json says.
-fs.copyFileSync(path.join(folder, 'camera.js'), path.join(pictures, 'camera.mjs'));
+const viewerFolder = path.join(folder, kind === 'package' ? 'node_modules/vcp-viewer' : '.');
+fs.copyFileSync(path.join(viewerFolder, 'camera.js'), path.join(pictures, 'camera.mjs'));
 const { Orbit, kFieldOfView } = await import(pathToFileURL(path.resolve(pictures, 'camera.mjs')));
 
 const kTypes = { '.html': 'text/html', '.js': 'text/javascript', '.wasm': 'application/wasm' };
@@ -401,7 +403,7 @@ async function moves() {
 
 /// An element that is taken out and put back, and a link that leads nowhere, show the scan.
 async function persists() {
-    for (const link of ['#vcp=%E0%A4%A', '#vcp=NaN,0,0,1,0,0', '#vcp=0,0,0,-1,0,0', '#vcp=<svg onload=1>']) {
+    for (const link of ['#vcp=%E0%A4%A', '#vcp=NaN,0,0,1,0,0', '#vcp=0,0,0,-1,0,0', '#vcp=1e308,1e308,0,1e308,0,0', '#vcp=<svg onload=1>']) {
         const page = await open(160, 100, { link: `?${link.length}${link}` });
         const fitted = await page.evaluate('viewer.camera');
         await page.evaluate('viewer.fit()');
@@ -421,6 +423,19 @@ async function persists() {
         state.settled = null;
     })()`);
     assert.equal(await shown(page), before);
+    await closeGood(page);
+}
+
+/// A view that cannot be drawn is one line, and the next one is drawn; so are elements of any form.
+async function recovers() {
+    const page = await open(160, 100);
+    await change(page, 'viewer.orbit.target = [NaN, 0, 0]; viewer.look(false)');
+    assert.match(await status(page), /coordinates that are not numbers/);
+    await change(page, 'viewer.fit()');
+    assert.deepEqual([await status(page), await page.evaluate('state.problem ?? null')], ['', null]);
+    await change(page, `viewer.style.height = '40000px'`);
+    assert.equal(await page.evaluate('state.last.height'), 16384);
+    await change(page, `viewer.style.height = ''`);
     await closeGood(page);
 }
 
@@ -475,6 +490,21 @@ async function complains() {
     }
 }
 
+/// A page written by hand, with the package for npm: it draws, moves and settles, and a module may import the class.
+async function packaged() {
+    const page = await open(800, 600);
+    const { width, height, samples } = await page.evaluate('state.last');
+    assert.deepEqual([height, samples], [480, 8]);
+    assert.ok(width > 700 && width <= 800);
+    const before = await shown(page);
+    assert.ok(before.length > 20000);
+    await change(page, 'viewer.orbit.turn(100, 0, 480); viewer.moved()');
+    assert.notEqual(await shown(page), before);
+    assert.ok(await page.evaluate(`import('./node_modules/vcp-viewer/vcp-viewer.js').then(({ VcpViewer }) => viewer instanceof VcpViewer)`));
+    await page.picture(path.join(pictures, 'page.png'));
+    await closeGood(page);
+}
+
 /// The network goes before all has come, and comes back.
 async function returns() {
     const page = await open(320, 200, { fault: 'gone' });
@@ -485,6 +515,13 @@ async function returns() {
     assert.equal(await page.evaluate('state.problem'), null);
     assert.equal(await status(page), '');
     await page.close();
+    // So it is where it was not there at first.
+    const late = await open(320, 200, { fault: 'down' });
+    assert.match(await status(late), /cannot be reached/);
+    wrong = '';
+    await change(late, `dispatchEvent(new Event('online'))`);
+    assert.deepEqual([await status(late), await late.evaluate('viewer.info.triangles > 0')], ['', true]);
+    await late.close();
 }
 
 /// The scan lies on another server than the page.
@@ -621,6 +658,8 @@ if (kind === 'short') {
     await step(measures, 'whole', 320, 200);
     await step(shares, false);
     for (const run of [moves, persists]) await step(run);
+} else if (kind === 'package') {
+    await step(packaged);
 } else if (kind === 'shards') {
     await step(showsShards);
 } else if (kind === 'images') {
@@ -638,7 +677,7 @@ if (kind === 'short') {
     if (scan.length > kLead) {
         for (const name of Object.keys(kCameras)) await step(measures, name, 320, 200);
         await step(shares, true);
-        for (const run of [moves, persists, annotates, returns, crosses, serves, servesCompressed]) await step(run);
+        for (const run of [moves, persists, recovers, annotates, returns, crosses, serves, servesCompressed]) await step(run);
     }
 }
 await browser.close();
