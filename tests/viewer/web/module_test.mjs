@@ -88,6 +88,21 @@ await check('whole and close: settles within the budget, antialiases', async () 
     }
 });
 
+await check('how far a point may be off is what the pages say that are drawn there', async () => {
+    const ranges = new Ranges('scan.vcp', server(file)), module = await opened(ranges), info = module.info(), orbit = new Orbit();
+    orbit.fit(info.boundsMin, info.boundsMax, 1.6);
+    look(module, orbit, 32, 20, 1e-3);
+    let first = module.update();
+    for (; !first.drawable; first = module.update()) await supply(module, ranges);
+    assert.ok(first.pagesInCut === 1 && !first.settled);
+    const coarse = module.pick(16, 10);
+    await settle(module, ranges, 64 << 20);
+    const fine = module.pick(16, 10);
+    console.log(`   at first ${coarse.error}, then ${fine.error}; ${Math.abs(coarse.depth - fine.depth)} apart`);
+    assert.ok(coarse.error > 2 * fine.error && fine.error === info.certifiedError);
+    assert.ok(Math.abs(coarse.depth - fine.depth) <= coarse.error + fine.error);
+});
+
 const limits = [];
 for (const name of natives) await check(`the picture and its pages are the native ones: ${name}`, async () => {
     const [width, height] = [320, 200], said = JSON.parse(fs.readFileSync(`${name}.said`));
