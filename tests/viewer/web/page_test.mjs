@@ -443,7 +443,8 @@ async function persists() {
     await closeGood(page);
 }
 
-/// A view that cannot be drawn is one line, and the next one is drawn; so are elements of any form.
+/// A view that cannot be drawn is one line, and the next one is drawn; so are elements of any form, and with attributes that
+/// say nothing. Without a scan nothing is shown, nor asked for.
 async function recovers() {
     const page = await open(160, 100);
     await change(page, 'viewer.orbit.target = [NaN, 0, 0]; viewer.look(false)');
@@ -453,6 +454,19 @@ async function recovers() {
     await change(page, `viewer.style.height = '40000px'`);
     assert.equal(await page.evaluate('state.last.height'), 16384);
     await change(page, `viewer.style.height = ''`);
+    const before = await shown(page);
+    await change(page, `viewer.setAttribute('mode', 'constructor')`);
+    assert.equal(await shown(page), before);
+    for (const budget of ['-5', 'x', '1e300', '0']) {
+        await change(page, `viewer.setAttribute('budget', '${budget}'); viewer.src = 'scan.vcp?${budget}'`);
+        assert.equal(await shown(page), before, budget);
+    }
+    await page.evaluate(`viewer.removeAttribute('src')`);
+    assert.deepEqual([await status(page), await page.evaluate(`part('.scale').hidden`)], ['', true]);
+    const empty = await shown(page);
+    await change(page, `viewer.src = 'scan.vcp?again'`);
+    assert.equal(await shown(page), before);
+    assert.ok(empty.length < before.length / 4);
     await closeGood(page);
 }
 
