@@ -14,6 +14,7 @@ const kFrameMs = 16; // between frames that nothing else asks for
 const kSamples = 8;          // of a pixel, where a view is at rest
 
 let told = null; // the picture that was said to be settled
+let isStale = false, drawnAt = 0, drawnMs = 0; // whether the cut is another one than the picture's; when that was done, and how long it took
 let module, ranges, view = null, awake = null, drawn = null, hidden = false, hasShown = false, decoding = 0;
 const asked = new Set(); // stretches under way
 let failed = null; // what could not be had: the error, and the stretch where it is one
@@ -244,23 +245,30 @@ async function turn(now) {
     fetchMissing();
     decodeJpegs();
     if (update.problem) post('problem', { message: update.problem });
-    const isNew = drawn?.view !== now || update.changed || update.awaitsRays;
+    isStale ||= update.changed;
+    const isNew = drawn?.view !== now || isStale || update.awaitsRays;
     const isNowGpus = drawn?.view === now && !byGpu && choice.wanted === 'webgl' && choice.isGpus(now);
-    if (update.drawable && (isNew || isNowGpus)) {
+    // While pages come, a view that stands still is drawn half of the time at most: while it is drawn none are asked for.
+    const waitMs = drawn?.view === now && asked.size > 0 && !update.awaitsRays ? drawnAt + drawnMs - performance.now() : 0;
+    if (update.drawable && (isNew || isNowGpus) && waitMs <= 0) {
         isAgain = !isNew;
-        const samples = await draw(now, update, 0);
+        isStale = false;
+        const began = performance.now(), samples = await draw(now, update, 0);
         drawn = samples === null ? null : { view: now, samples };
-    } else if (update.settled && !now.moving && drawn?.view === now && drawn.samples < kSamples && now.mode < 3) {
+        drawnAt = performance.now();
+        drawnMs = drawnAt - began;
+    } else if (!isNew && update.settled && !now.moving && drawn.samples < kSamples && now.mode < 3) {
         const samples = await draw(now, update, drawn.samples);
         drawn = samples === null ? null : { view: now, samples: samples === 0 ? kSamples : samples };
     } else if (view === now) {
-        if (update.settled && !now.moving) {
+        if (update.settled && !isNew && !now.moving) {
             if (told !== drawn) post('settled', { number: now.number, update });
             told = drawn;
-            if (drawn && !byGpu && choice.isOpen(now, castMs)) choice.judge(now, castMs);
+            if (!byGpu && choice.isOpen(now, castMs)) choice.judge(now, castMs);
         }
         // The policy may need more frames before it lets pages go that were seen a moment ago.
-        await woken(!update.settled && !isStopped && asked.size + decoding === 0 ? kFrameMs : Infinity);
+        const needsFrames = !update.settled && !isStopped && asked.size + decoding === 0;
+        await woken(needsFrames ? kFrameMs : waitMs > 0 ? waitMs : Infinity);
     }
 }
 

@@ -76,6 +76,30 @@ Module.prototype.castBands = function (...all) {
     world.now += world.random(0, world.slowness); // a processor takes its time
     return castBands.apply(this, all);
 };
+/// While pages come, a view that stands still is drawn half of the time at most.
+let drawnSoon = 0;
+const { look, update, beginSample, endSample } = Module.prototype;
+Object.assign(Module.prototype, {
+    look(view) {
+        this.number = view.number;
+        look.call(this, view);
+    },
+    update() {
+        const updated = update.call(this);
+        this.awaitsRays = updated.awaitsRays;
+        return updated;
+    },
+    beginSample(sample) {
+        const { number, end, ms } = this.picture ?? {};
+        if (sample === 0 && number === this.number && !this.awaitsRays && world.network?.underWay > 0 && world.now < end + ms) ++drawnSoon;
+        if (sample === 0) this.beganAt = world.now;
+        return beginSample.call(this, sample);
+    },
+    endSample(begun) {
+        endSample.call(this, begun);
+        this.picture = { number: this.number, end: world.now, ms: world.now - this.beganAt };
+    },
+});
 /// JPEGs are decoded to this; their headers say how large they are.
 const grey = (width, height) => new Uint8ClampedArray(4 * width * height).fill(99);
 globalThis.OffscreenCanvas = class {
@@ -253,7 +277,7 @@ async function rests(page, compares) {
     await page.until(() => page.settled || page.problem);
     if (!page.settled) while (await world.step());
     if (!page.settled) {
-        assert.equal(page.drawn, page.number, 'what is there is drawn');
+        assert.equal(page.drawn, page.number, `what is there is drawn: ${page.problem}`);
         ++problems;
         page.send({ type: 'retry' });
         await page.until(() => page.settled);
@@ -283,11 +307,13 @@ let hits = 0, relaxed = 0, problems = 0, drew = 0;
 /// Returns the views of a page.
 async function visit(scan, budget, workers) {
     Object.assign(world, { slowness: world.pick([0, 20, 400]), mode: 0, occlusion: 0, fine: 0.5 });
-    const page = await Page.open(new Network(fs.readFileSync(scan)), budget * 2 ** 20, workers);
+    world.network = new Network(fs.readFileSync(scan));
+    const page = await Page.open(world.network, budget * 2 ** 20, workers);
     for (let view = 0; view < kViews; ++view) {
         await goOn(page);
         if (view === kViews - 1 || world.chance(0.3)) await rests(page, view === kViews - 1);
     }
+    assert.equal(drawnSoon, 0, 'while it is drawn nothing is asked for');
     drew = Math.max(drew, page.workers);
     for (const module of modules.splice(0)) module.wasm = null; // its memory can go
 }
