@@ -3,6 +3,7 @@
 const kLeastPitch = -1.55, kMostPitch = 1.55;
 export const kFieldOfView = 0.6; // radians, from the lower to the upper edge
 
+const kFarthest = 1e15; // of what links say: no picture can be made from much farther away
 const kFitted = 0.96; // of the picture's half sides, for the whole box
 
 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
@@ -69,7 +70,7 @@ export class Orbit {
     }
     fromText(text) {
         const n = text.split(',').map(Number);
-        if (n.length !== 6 || !n.every(Number.isFinite) || !(n[3] > 0)) return false;
+        if (n.length !== 6 || !n.every(x => Math.abs(x) <= kFarthest) || !(n[3] > 0)) return false;
         this.target = n.slice(0, 3);
         [this.distance, this.yaw, this.pitch] = n.slice(3);
         this.pitch = Math.min(Math.max(this.pitch, kLeastPitch), kMostPitch);

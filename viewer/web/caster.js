@@ -29,5 +29,6 @@ self.onmessage = async ({ data: { port, compiled, lead } }) => {
             fail();
         }
     };
+    port.onmessageerror = fail; // there is no memory for a copy
     port.postMessage({ type: 'ready' });
 };

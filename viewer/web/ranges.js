@@ -2,6 +2,7 @@
 
 const kAttempts = 4;
 const kFirstDelay = 300; // ms; twice as long after each failure
+const kSilentMs = 15e3; // twice in a row without a byte, and the connection is taken for lost
 
 /// What went wrong with the server: a line for people. Trying again does not help.
 export class ServerError extends Error {}
@@ -58,6 +59,7 @@ export class Ranges {
         this.bytes = 0;
         this.tag = null;
         this.delay = kFirstDelay;
+        this.silentMs = kSilentMs;
     }
 
     /// Returns the bytes from `offset` on, `bytes` of them, fewer where the file ends. `anew`: not from a cache.
@@ -73,32 +75,58 @@ export class Ranges {
     }
 
     async once(offset, bytes, anew, signal) {
-        const abort = new AbortController();
+        const abort = new AbortController(), silence = this.silence(abort);
         signal?.addEventListener('abort', () => abort.abort(), { once: true });
         ++this.requests;
         const end = () => (this.size === null ? offset + bytes : Math.min(offset + bytes, this.size));
-        const answer = await this.fetch(this.url, {
-            headers: { Range: `bytes=${offset}-${end() - 1}` },
-            cache: anew ? 'reload' : 'default',
-            signal: abort.signal,
-        }).catch(() => {
-            // Browsers do not tell a page which of these it is.
-            throw new Error(`${this.url}: the server cannot be reached, lets no other site's pages in, or compresses ranges`);
-        });
         try {
+            const answer = await this.fetch(this.url, {
+                headers: { Range: `bytes=${offset}-${end() - 1}` },
+                cache: anew ? 'reload' : 'default',
+                signal: abort.signal,
+            }).catch(() => {
+                // Browsers do not tell a page which of these it is.
+                throw new Error(`${this.url}: the server cannot be reached, lets no other site's pages in, or compresses ranges`);
+            });
             this.check(answer, offset);
+            // The first answer says where the file ends.
+            const expected = end() - offset, got = await this.bytesOf(answer, silence, expected);
+            if (this.size !== null && got.length < expected) throw new Error(`${this.url}: the answer was cut off`);
+            return got;
         } catch (error) {
             abort.abort(); // the rest of a whole file is not downloaded
-            throw error;
+            throw silence.isLong ? new Error(`${this.url}: the server does not answer`) : error;
+        } finally {
+            clearInterval(silence.timer);
         }
-        const got = new Uint8Array(await answer.arrayBuffer());
-        this.bytes += got.length;
-        // The first answer says where the file ends.
-        const expected = end() - offset;
-        if (got.length > expected) throw new ServerError(`${this.url}: the server sent more bytes than asked for`);
-        if (this.size !== null && got.length < expected)
-            throw new Error(`${this.url}: the answer was cut off`);
-        return got;
+    }
+    /// Returns the bytes of an answer. Errors: there are more than that.
+    async bytesOf(answer, silence, most) {
+        const reader = answer.body.getReader(), got = new Uint8Array(most);
+        let count = 0;
+        const next = () => reader.read().catch(() => { throw new Error(`${this.url}: the answer was cut off`); });
+        for (let piece = await next(); !piece.done; piece = await next()) {
+            silence.heard = true;
+            if (count + piece.value.length > most) throw new ServerError(`${this.url}: the server sent more bytes than asked for`);
+            got.set(piece.value, count);
+            count += piece.value.length;
+        }
+        this.bytes += count;
+        return got.subarray(0, count);
+    }
+    /// Ends a request of which nothing is heard any more: no browser does so soon. While this thread was busy it could
+    /// hear nothing.
+    silence(abort) {
+        const silence = { heard: true, isLong: false };
+        let last = performance.now();
+        silence.timer = setInterval(() => {
+            const isLate = performance.now() - last > 1.5 * this.silentMs;
+            silence.isLong = !silence.heard && !isLate;
+            silence.heard = isLate;
+            last = performance.now();
+            if (silence.isLong) abort.abort();
+        }, this.silentMs);
+        return silence;
     }
 
     check(answer, offset) {

@@ -34,6 +34,7 @@ export class Caster {
                 this.done(data);
             }
         };
+        port.onmessageerror = () => this.lose();
         this.done = () => {};
     }
     /// It is gone: nothing more is asked of it.

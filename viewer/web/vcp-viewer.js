@@ -9,9 +9,9 @@ const kOcclusionRays = 8; // a pixel
 const kRestMs = 160; // without a movement: the view is at rest
 const kSaidMs = 4000; // a line that answers a button stands as long
 const kTapMs = 300, kTapPixels = 24; // two taps so near each other are one double tap
-const kMostPixels = 1.6e6;
+const kMostPixels = 1.6e6, kMostSide = 16384; // of pictures
 const kColourError = 6; // ΔE that may be seen, where nothing else is asked for
-const kPhoneBudget = 64 << 20, kBudget = 192 << 20; // of decoded pages, in all workers
+const kPhoneBudget = 64 << 20, kBudget = 192 << 20, kMostBudget = 4096; // of decoded pages, in all workers
 const kWorkerBudget = 32 << 20, kLeastShare = 1 << 20; // of the budget for each worker more; of what it holds of pages
 const kMostWorkers = 8;
 
@@ -94,7 +94,8 @@ export class VcpViewer extends HTMLElement {
         this.resizing.observe(this);
         this.onHidden = () => this.worker?.postMessage({ type: 'hide', hidden: document.hidden });
         document.addEventListener('visibilitychange', this.onHidden);
-        this.onOnline = () => this.worker?.postMessage({ type: 'retry' });
+        // What could not even be opened is begun anew.
+        this.onOnline = () => (this.info || !this.problems.scan ? this.worker?.postMessage({ type: 'retry' }) : this.open());
         addEventListener('online', this.onOnline);
         this.chooseTheme();
         this.light.fromText(this.getAttribute('light') ?? '');
@@ -211,13 +212,16 @@ export class VcpViewer extends HTMLElement {
         this.info = null;
         this.points = [];
         this.problems = {};
-        this.loading = 'Opening…';
+        this.loading = this.src ? 'Opening…' : '';
+        this.parts.canvas.width = this.parts.canvas.width; // empties it
+        this.drawOver();
         this.showStatus();
+        if (!this.src) return;
         this.worker = new Worker(new URL('./worker.js', import.meta.url), { type: 'module' });
         this.worker.onmessage = ({ data }) => this.hear(data);
         this.worker.onerror = event => this.fail('scan', event.message || 'the viewer could not be loaded');
         const isPhone = matchMedia('(pointer: coarse)').matches;
-        const budget = Number(this.getAttribute('budget')) * 2 ** 20 || (isPhone ? kPhoneBudget : kBudget);
+        const budget = Math.min(numberOf(this.getAttribute('budget'), 0), kMostBudget) * 2 ** 20 || (isPhone ? kPhoneBudget : kBudget);
         this.shared = sharedBudget(budget, Number(this.getAttribute('workers') ?? NaN));
         this.worker.postMessage({
             type: 'open', url: new URL(this.src, document.baseURI).href, wasm: new URL('./vcp.wasm', import.meta.url).href,
@@ -287,11 +291,11 @@ export class VcpViewer extends HTMLElement {
     look(moving) {
         if (!this.info || !this.worker || this.clientWidth === 0) return;
         const dense = Math.min(devicePixelRatio || 1, 2);
-        const pixels = this.clientWidth * this.clientHeight * dense * dense;
-        const scale = dense * Math.min(1, Math.sqrt(kMostPixels / pixels)) * (moving ? this.movingScale : 1);
+        const pixels = this.clientWidth * this.clientHeight * dense * dense, side = Math.max(this.clientWidth, this.clientHeight) * dense;
+        const scale = dense * Math.min(1, Math.sqrt(kMostPixels / pixels), kMostSide / side) * (moving ? this.movingScale : 1);
         const width = Math.max(1, Math.round(this.clientWidth * scale)), height = Math.max(1, Math.round(this.clientHeight * scale));
         const colourError = numberOf(this.getAttribute('colour-error'), kColourError);
-        const { up, forward } = this.orbit.axes(), mode = kModes[this.mode] ?? 0, theme = kTheme[this.dataset.theme];
+        const { up, forward } = this.orbit.axes(), mode = Object.hasOwn(kModes, this.mode) ? kModes[this.mode] : 0, theme = kTheme[this.dataset.theme];
         this.worker.postMessage({
             type: 'look', width, height, moving, mode, number: ++this.number,
             eye: this.orbit.eye(), forward, up, fov: kFieldOfView, errorPixels: moving ? 1 : 0.5, colourError,

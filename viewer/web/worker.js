@@ -14,8 +14,11 @@ const kFrameMs = 16; // between frames that nothing else asks for
 const kSamples = 8;          // of a pixel, where a view is at rest
 
 let told = null; // the picture that was said to be settled
-let module, ranges, view = null, awake = null, failed = null, drawn = null, hidden = false, hasShown = false, decoding = 0;
+let isStale = false, drawnAt = 0, drawnMs = 0; // whether the cut is another one than the picture's; when that was done, and how long it took
+let module, ranges, view = null, awake = null, drawn = null, hidden = false, hasShown = false, decoding = 0;
 const asked = new Set(); // stretches under way
+let failed = null; // what could not be had: the error, and the stretch where it is one
+let isStopped = false; // nothing more is asked for until the page says so, or shows another view
 let fetched = []; // stretches that came
 const casters = []; // the other workers
 let plan = null; // which bands of the picture are whose
@@ -46,9 +49,16 @@ async function open({ url, wasm, budgetBytes, draw }) {
     post('opened', { info: module.info(), start: { compiled: module.compiled, lead: module.lead() } });
 }
 
-/// Fetches what the module misses, the most urgent first; the loop goes on when it has come.
+/// Fetches what the module misses, the most urgent first; the loop goes on when it has come. What failed is said where
+/// it is still missed.
 function fetchMissing() {
-    const underWay = [...asked], missing = without(module.missing(), underWay);
+    const all = module.missing(), underWay = [...asked], missing = without(all, underWay);
+    if (failed && (!failed.part || all.some(one => overlap(one, failed.part)))) {
+        post('error', { message: lineOf(failed.error) });
+        isStopped = true;
+    }
+    failed = null;
+    if (isStopped) return;
     let bytesAsked = underWay.reduce((sum, run) => sum + run.bytes, 0);
     for (const run of urgentFirst(joined(missing, kGap, kMostBytes), missing)) {
         // What is joined may have something between that is under way, or was fetched before.
@@ -72,7 +82,7 @@ function fetchPart(part) {
         .catch(error => {
             // Without one of several files the others are shown.
             if (error instanceof MissingFile && module.placeOf(part.offset).name !== '') module.lose(part.offset, error.message);
-            else failed = error;
+            else failed = { error, part };
         })
         .finally(() => {
             asked.delete(part);
@@ -87,7 +97,7 @@ function decodeJpegs() {
         texelsOf(jpeg).catch(() => null).then(texels => {
             --decoding;
             module.putJpeg(jpeg.id, texels);
-        }).catch(error => { failed = error; }).finally(wake);
+        }).catch(error => { failed = { error }; }).finally(wake);
     }
 }
 
@@ -106,9 +116,13 @@ function wake() {
     awake = null;
 }
 
-/// A line for people. What ends an instance of WebAssembly is want of memory (wasm/thrown.cpp).
+/// What ends an instance of WebAssembly is want of memory (wasm/thrown.cpp).
+function isWantOfMemory(error) {
+    return error instanceof WebAssembly.RuntimeError || error instanceof RangeError;
+}
+/// A line for people.
 function lineOf(error) {
-    if (error instanceof WebAssembly.RuntimeError || error instanceof RangeError)
+    if (isWantOfMemory(error))
         return 'the browser has no more memory for this scan; a smaller `budget` may do';
     return error.message;
 }
@@ -199,47 +213,62 @@ function hitAt({ x, y }) {
     return module.pick(texel(x, view.width), texel(y, view.height));
 }
 
+/// Draws views, each until it has settled and the next one comes. One that cannot be drawn is one line.
 async function run() {
     for (;;) {
-        if (failed) {
-            post('error', { message: failed.message });
-            failed = null;
-            await new Promise(done => { awake = done; });
-            continue;
-        }
-        if (hidden) {
-            await new Promise(done => { awake = done; });
-            continue;
-        }
         const now = view;
-        module.look(now);
-        const update = module.update();
-        fetchMissing();
-        decodeJpegs();
-        if (update.problem) post('problem', { message: update.problem });
-        const isNew = drawn?.view !== now || update.changed || update.awaitsRays;
-        const isNowGpus = drawn?.view === now && !byGpu && choice.wanted === 'webgl' && choice.isGpus(now);
-        if (update.drawable && (isNew || isNowGpus)) {
-            isAgain = !isNew;
-            const samples = await draw(now, update, 0);
-            drawn = samples === null ? null : { view: now, samples };
-        } else if (update.settled && !now.moving && drawn?.view === now && drawn.samples < kSamples && now.mode < 3) {
-            const samples = await draw(now, update, drawn.samples);
-            drawn = samples === null ? null : { view: now, samples: samples === 0 ? kSamples : samples };
-        } else if (view === now) {
-            if (update.settled && !now.moving) {
-                if (told !== drawn) post('settled', { number: now.number, update });
-                told = drawn;
-                if (drawn && !byGpu && choice.isOpen(now, castMs)) choice.judge(now, castMs);
-            }
-            await new Promise(done => {
-                awake = done;
-                // The policy may need more frames before it lets pages go that were seen a moment ago.
-                if (!update.settled && asked.size + decoding === 0) setTimeout(done, kFrameMs);
-            });
+        try {
+            await turn(now);
+        } catch (error) {
+            post('error', { message: lineOf(error) });
+            if (isWantOfMemory(error)) return; // nobody knows what is in the memory now
+            drawn = null;
+            if (view === now) await woken();
         }
         // Messages of the page come in between.
         await new Promise(done => setTimeout(done));
+    }
+}
+/// Waits until something has happened, or so many milliseconds have passed.
+function woken(mostMs = Infinity) {
+    return new Promise(done => {
+        awake = done;
+        if (mostMs < Infinity) setTimeout(done, mostMs);
+    });
+}
+
+/// Goes one step on with a view, or waits until something has happened.
+async function turn(now) {
+    if (hidden) return woken();
+    module.look(now);
+    const update = module.update();
+    fetchMissing();
+    decodeJpegs();
+    if (update.problem) post('problem', { message: update.problem });
+    isStale ||= update.changed;
+    const isNew = drawn?.view !== now || isStale || update.awaitsRays;
+    const isNowGpus = drawn?.view === now && !byGpu && choice.wanted === 'webgl' && choice.isGpus(now);
+    // While pages come, a view that stands still is drawn half of the time at most: while it is drawn none are asked for.
+    const waitMs = drawn?.view === now && asked.size > 0 && !update.awaitsRays ? drawnAt + drawnMs - performance.now() : 0;
+    if (update.drawable && (isNew || isNowGpus) && waitMs <= 0) {
+        isAgain = !isNew;
+        isStale = false;
+        const began = performance.now(), samples = await draw(now, update, 0);
+        drawn = samples === null ? null : { view: now, samples };
+        drawnAt = performance.now();
+        drawnMs = drawnAt - began;
+    } else if (!isNew && update.settled && !now.moving && drawn.samples < kSamples && now.mode < 3) {
+        const samples = await draw(now, update, drawn.samples);
+        drawn = samples === null ? null : { view: now, samples: samples === 0 ? kSamples : samples };
+    } else if (view === now) {
+        if (update.settled && !isNew && !now.moving) {
+            if (told !== drawn) post('settled', { number: now.number, update });
+            told = drawn;
+            if (!byGpu && choice.isOpen(now, castMs)) choice.judge(now, castMs);
+        }
+        // The policy may need more frames before it lets pages go that were seen a moment ago.
+        const needsFrames = !update.settled && !isStopped && asked.size + decoding === 0;
+        await woken(needsFrames ? kFrameMs : waitMs > 0 ? waitMs : Infinity);
     }
 }
 
@@ -249,7 +278,8 @@ self.onmessage = async ({ data }) => {
         else if (data.type === 'look') {
             const isFirst = view === null;
             view = data;
-            if (isFirst) run().catch(error => post('error', { message: lineOf(error) }));
+            isStopped = false;
+            if (isFirst) run();
             else wake();
         } else if (data.type === 'pick') {
             post('picked', { id: data.id, hit: hitAt(data) });
@@ -260,7 +290,10 @@ self.onmessage = async ({ data }) => {
         } else if (data.type === 'hide') {
             hidden = data.hidden; // nothing is drawn that nobody sees
             wake();
-        } else if (data.type === 'retry') wake();
+        } else if (data.type === 'retry') {
+            isStopped = false;
+            wake();
+        }
     } catch (error) {
         post('error', { message: lineOf(error) });
     }

@@ -57,7 +57,8 @@ export class Browser {
         const ended = new Promise(done => this.process.once('exit', done));
         await this.call('Browser.close');
         await ended;
-        fs.rmSync(this.profile, { recursive: true, force: true });
+        // Its other processes may still write there.
+        fs.rmSync(this.profile, { recursive: true, force: true, maxRetries: 20, retryDelay: 100 });
     }
 }
 
@@ -100,7 +101,7 @@ class Page {
         return answer.result.value;
     }
     /// Waits until an expression of the page is true. Errors: it is not after `mostMs`.
-    async until(expression, mostMs = 60e3) {
+    async until(expression, mostMs = 240e3) {
         for (const end = Date.now() + mostMs; Date.now() < end;) {
             if (await this.evaluate(expression)) return;
             await new Promise(done => setTimeout(done, 50));

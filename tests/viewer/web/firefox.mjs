@@ -88,14 +88,19 @@ export class Firefox {
         await this.inside(`for (const [name, size] of [['width', ${width}], ['height', ${height}]])
             for (const limit of ['min', 'max']) gBrowser.selectedBrowser.style[limit + '-' + name] = size + 'px';
             Services.console.reset();`);
-        return new Page(this);
+        const page = new Page(this);
+        await page.until(`innerWidth === ${width} && innerHeight === ${height}`);
+        return page;
     }
 
     async close() {
         const ended = new Promise(done => this.process.once('exit', done));
         this.call('Marionette:Quit', { flags: ['eForceQuit'] }).catch(() => {});
+        const stuck = setTimeout(() => this.process.kill('SIGKILL'), 60e3);
         await ended;
-        fs.rmSync(this.profile, { recursive: true, force: true });
+        clearTimeout(stuck);
+        // Its other processes may still write there.
+        fs.rmSync(this.profile, { recursive: true, force: true, maxRetries: 20, retryDelay: 100 });
     }
 }
 

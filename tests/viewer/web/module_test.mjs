@@ -88,6 +88,21 @@ await check('whole and close: settles within the budget, antialiases', async () 
     }
 });
 
+await check('how far a point may be off is what the pages say that are drawn there', async () => {
+    const ranges = new Ranges('scan.vcp', server(file)), module = await opened(ranges), info = module.info(), orbit = new Orbit();
+    orbit.fit(info.boundsMin, info.boundsMax, 1.6);
+    look(module, orbit, 32, 20, 1e-3);
+    let first = module.update();
+    for (; !first.drawable; first = module.update()) await supply(module, ranges);
+    assert.ok(first.pagesInCut === 1 && !first.settled);
+    const coarse = module.pick(16, 10);
+    await settle(module, ranges, 64 << 20);
+    const fine = module.pick(16, 10);
+    console.log(`   at first ${coarse.error}, then ${fine.error}; ${Math.abs(coarse.depth - fine.depth)} apart`);
+    assert.ok(coarse.error > 2 * fine.error && fine.error === info.certifiedError);
+    assert.ok(Math.abs(coarse.depth - fine.depth) <= coarse.error + fine.error);
+});
+
 const limits = [];
 for (const name of natives) await check(`the picture and its pages are the native ones: ${name}`, async () => {
     const [width, height] = [320, 200], said = JSON.parse(fs.readFileSync(`${name}.said`));
@@ -267,6 +282,38 @@ await check('servers that do wrong end in one line', async () => {
     await says(() => new Response('', { status: 503 }), /answers 503/, 4);
     await says(answer => new Response(answer.body, { status: 206, headers: { 'Content-Range': 'bytes 7-9/99' } }), /another range/, 1);
     await says(answer => new Response(answer.body, { status: 206 }), /hides Content-Range/, 1);
+});
+
+await check('a connection of which nothing is heard any more is given up, a slow one is not', async () => {
+    const slow = quick(new Ranges('scan.vcp', async (url, { headers, signal }) => {
+        const answer = await server(file)(url, { headers }), bytes = new Uint8Array(await answer.arrayBuffer());
+        let at = 0;
+        const body = new ReadableStream({ async pull(to) {
+            await new Promise(done => setTimeout(done, 30));
+            assert.ok(!signal.aborted);
+            to.enqueue(bytes.subarray(at, at += 20));
+            if (at >= bytes.length) to.close();
+        } });
+        return new Response(body, answer);
+    }));
+    slow.silentMs = 200;
+    assert.ok(Buffer.from(await slow.read(0, 500)).equals(file.subarray(0, 500)));
+    assert.deepEqual([slow.requests, slow.bytes], [1, 500]);
+    // One says nothing at all, the other one stops half-way.
+    const silent = (url, { signal }) => new Promise((_, fail) => signal.addEventListener('abort', () => fail(signal.reason)));
+    const stops = async (url, { headers, signal }) => new Response(new ReadableStream({ start(to) {
+        to.enqueue(new Uint8Array(10));
+        signal.addEventListener('abort', () => to.error(signal.reason));
+    } }), await server(file)(url, { headers }));
+    for (const fetch of [silent, stops]) {
+        const ranges = quick(new Ranges('scan.vcp', fetch));
+        ranges.silentMs = 20;
+        await assert.rejects(ranges.read(0, 100), /^Error: scan.vcp: the server does not answer$/);
+        assert.equal(ranges.requests, 4);
+        // It answers again.
+        ranges.fetch = server(file);
+        assert.ok(Buffer.from(await ranges.read(0, 100)).equals(file.subarray(0, 100)));
+    }
 });
 
 await check('a small file is asked for once', async () => {

@@ -70,8 +70,8 @@ export function cast(module, sample = 0, width = 320, height = 200) {
     return depth;
 }
 
-/// Goes on until nothing is missing, as the worker does; returns the last update.
-export async function settle(module, ranges, budget) {
+/// Goes on until nothing is missing, as the worker does; returns the last update. `decode(jpeg)`: its texels.
+export async function settle(module, ranges, budget, decode = () => null) {
     for (let round = 0; round < 1000; ++round) {
         const update = module.update();
         assert.equal(update.problem, null);
@@ -79,6 +79,7 @@ export async function settle(module, ranges, budget) {
         if (update.drawable && update.awaitsRays) cast(module);
         if (update.settled) return update;
         await supply(module, ranges);
+        for (const jpeg of module.jpegs()) module.putJpeg(jpeg.id, decode(jpeg));
     }
     assert.fail('it does not settle');
 }

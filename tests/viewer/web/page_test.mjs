@@ -1,7 +1,8 @@
-// A published page in a headless browser: page_test.mjs chromium|firefox VCP FOLDER PICTURES [images|shards|short]
+// A published page in a headless browser: page_test.mjs chromium|firefox VCP FOLDER PICTURES [images|package|shards|short]
 // FOLDER: as `vcp publish` makes it. PICTURES: folder for what is seen. images: the scan is textured_scene.mjs', without
 // loss, and the folder has it with JPEGs as well, as jpeg.vcp; what concerns images is tested. shards: the scan is in shards,
-// and the folder has it as the one file as well, as whole.vcp. short: what browsers may do otherwise.
+// and the folder has it as the one file as well, as whole.vcp. package: the
+// viewer is in node_modules. short: what browsers may do otherwise.
 import assert from 'node:assert/strict';
 import { execFileSync, spawn } from 'node:child_process';
 import fs from 'node:fs';
@@ -16,7 +17,8 @@ import { compareColours, compareDepth, readDepth, readPicture } from './native_p
 
 const [browserName, vcp, folder, pictures, kind] = process.argv.slice(2);
 // Read as a module whatever the nearest package.json says.
-fs.copyFileSync(path.join(folder, 'camera.js'), path.join(pictures, 'camera.mjs'));
+const viewerFolder = path.join(folder, kind === 'package' ? 'node_modules/vcp-viewer' : '.');
+fs.copyFileSync(path.join(viewerFolder, 'camera.js'), path.join(pictures, 'camera.mjs'));
 const { Orbit, kFieldOfView } = await import(pathToFileURL(path.resolve(pictures, 'camera.mjs')));
 
 const kTypes = { '.html': 'text/html', '.js': 'text/javascript', '.wasm': 'application/wasm' };
@@ -57,6 +59,7 @@ function serve(request, answer) {
 }
 async function started() {
     const server = http.createServer(serve).listen(0, '127.0.0.1');
+    server.keepAliveTimeout = 0; // what a busy browser leaves idle stays open
     await new Promise(done => server.once('listening', done));
     return `http://127.0.0.1:${server.address().port}/`;
 }
@@ -88,6 +91,7 @@ async function open(width, height, { fault = '', link = '', touch = false, site 
     asked = nothingAsked();
     const page = await browser.page(width, height, touch);
     await page.go(site + link);
+    await page.until(`location.href.startsWith('${site}') && innerWidth === ${width} && innerHeight === ${height}`);
     await settle(page);
     return page;
 }
@@ -98,6 +102,14 @@ async function settle(page) {
 async function change(page, expression) {
     await page.evaluate(`state.settled = state.problem = null; ${expression}`);
     await settle(page);
+}
+/// Waits until the view stands still and has settled: no movement is still to come to rest.
+async function rest(page) {
+    await change(page, 'clearTimeout(viewer.resting); viewer.look(false)');
+}
+/// Does what an expression says until another one is true.
+async function changeUntil(page, isSo, expression) {
+    for (const end = Date.now() + 240e3; !await page.evaluate(isSo); await change(page, expression)) assert.ok(Date.now() < end, isSo);
 }
 /// A page of the good server: it did what it had to, and its console is empty.
 async function closeGood(page) {
@@ -158,7 +170,7 @@ async function openShared(workers, file) {
     await change(page, `viewer.setAttribute('workers', ${workers}); viewer.src = '${file}?${workers}'; viewer.info = null`);
     // The others take part from the second picture on.
     await page.until(`viewer.info !== null`);
-    for (let i = 0; i < 100 && await page.evaluate('state.last.workers') < workers; ++i) await change(page, 'viewer.look(false)');
+    await changeUntil(page, `state.last.workers >= ${workers}`, 'viewer.look(false)');
     assert.equal(await page.evaluate('state.last.workers'), workers);
     return page;
 }
@@ -183,8 +195,8 @@ async function shares(many) {
     // One that ends while it casts is done without.
     const page = await open(kSharedWidth, 200);
     await change(page, `viewer.setAttribute('workers', 2); viewer.src = 'scan.vcp?lost'`);
-    for (let i = 0; i < 100 && await page.evaluate('state.last.workers') < 2; ++i) await change(page, 'viewer.look(false)');
-    await change(page, `viewer.camera = '${kCameras.close.join(',')}'; viewer.look(false);
+    await changeUntil(page, 'state.last.workers === 2', 'viewer.look(false)');
+    await change(page, `viewer.camera = '${kCameras.close.join(',')}'; clearTimeout(viewer.resting); viewer.look(false);
         viewer.casters[0].terminate(); viewer.casters[0].onerror(new Event('error'))`);
     assert.equal(await page.evaluate('state.last.workers'), 1);
     assert.equal(await shown(page), pictures[0][0]);
@@ -355,7 +367,9 @@ async function moves() {
     const camera = page => page.evaluate(`viewer.camera.split(',').map(Number)`);
     let page = await open(390, 844, { touch: true }), before = await camera(page);
     const finger = (x, y) => ({ x, y, id: 0 }), thumb = (x, y) => ({ x, y, id: 1 });
-    const moved = async what => {
+    /// What of the camera has changed, once something has.
+    const moved = async () => {
+        await page.until(`viewer.camera !== '${before}'`);
         const now = await camera(page), changed = now.map((x, i) => Math.abs(x - before[i]) > 1e-6);
         before = now;
         return { target: changed.slice(0, 3).some(Boolean), distance: changed[3], turned: changed[4] || changed[5] };
@@ -366,11 +380,16 @@ async function moves() {
     await page.touch([[finger(150, 300), thumb(250, 500)], [finger(100, 250), thumb(300, 550)]]);
     assert.deepEqual(await moved(), { target: true, distance: true, turned: false }, 'two fingers zoom and move');
     assert.ok(before[3] < distance);
+    // Two taps are one double tap where they come soon: what has no time for that taps again.
     await page.touch([[finger(200, 300)]]);
-    await page.touch([[finger(203, 302)]]);
+    assert.deepEqual(await camera(page), before, 'a tap alone does nothing');
+    for (const end = Date.now() + 240e3; String(await camera(page)) === String(before);) {
+        assert.ok(Date.now() < end, 'a double tap comes nearer');
+        await page.touch([[finger(203, 302)]]);
+    }
     assert.deepEqual(await moved(), { target: true, distance: true, turned: false }, 'a double tap comes nearer');
     await page.hover(1, 1);
-    await change(page, '');
+    await rest(page);
     await closeGood(page);
 
     page = await open(320, 200);
@@ -386,7 +405,7 @@ async function moves() {
     await page.key('f');
     assert.deepEqual(await moved(), { target: true, distance: true, turned: false });
     // Who has no mouse measures from the middle, and closes with Escape.
-    await change(page, '');
+    await rest(page);
     await page.key('m');
     await page.key('Enter');
     await page.until('state.picks.length === 1');
@@ -401,12 +420,12 @@ async function moves() {
 
 /// An element that is taken out and put back, and a link that leads nowhere, show the scan.
 async function persists() {
-    for (const link of ['#vcp=%E0%A4%A', '#vcp=NaN,0,0,1,0,0', '#vcp=0,0,0,-1,0,0', '#vcp=<svg onload=1>']) {
+    for (const link of ['#vcp=%E0%A4%A', '#vcp=NaN,0,0,1,0,0', '#vcp=0,0,0,-1,0,0', '#vcp=1e308,1e308,0,1e308,0,0', '#vcp=<svg onload=1>']) {
         const page = await open(160, 100, { link: `?${link.length}${link}` });
         const fitted = await page.evaluate('viewer.camera');
         await page.evaluate('viewer.fit()');
         assert.equal(await page.evaluate('viewer.camera'), fitted, link);
-        await change(page, '');
+        await rest(page);
         await closeGood(page);
     }
     const page = await open(160, 100), before = await shown(page);
@@ -421,6 +440,33 @@ async function persists() {
         state.settled = null;
     })()`);
     assert.equal(await shown(page), before);
+    await closeGood(page);
+}
+
+/// A view that cannot be drawn is one line, and the next one is drawn; so are elements of any form, and with attributes that
+/// say nothing. Without a scan nothing is shown, nor asked for.
+async function recovers() {
+    const page = await open(160, 100);
+    await change(page, 'viewer.orbit.target = [NaN, 0, 0]; viewer.look(false)');
+    assert.match(await status(page), /coordinates that are not numbers/);
+    await change(page, 'viewer.fit()');
+    assert.deepEqual([await status(page), await page.evaluate('state.problem ?? null')], ['', null]);
+    await change(page, `viewer.style.height = '40000px'`);
+    assert.equal(await page.evaluate('state.last.height'), 16384);
+    await change(page, `viewer.style.height = ''`);
+    const before = await shown(page);
+    await change(page, `viewer.setAttribute('mode', 'constructor')`);
+    assert.equal(await shown(page), before);
+    for (const budget of ['-5', 'x', '1e300', '0']) {
+        await change(page, `viewer.setAttribute('budget', '${budget}'); viewer.src = 'scan.vcp?${budget}'`);
+        assert.equal(await shown(page), before, budget);
+    }
+    await page.evaluate(`viewer.removeAttribute('src')`);
+    assert.deepEqual([await status(page), await page.evaluate(`part('.scale').hidden`)], ['', true]);
+    const empty = await shown(page);
+    await change(page, `viewer.src = 'scan.vcp?again'`);
+    assert.equal(await shown(page), before);
+    assert.ok(empty.length < before.length / 4);
     await closeGood(page);
 }
 
@@ -475,6 +521,21 @@ async function complains() {
     }
 }
 
+/// A page written by hand, with the package for npm: it draws, moves and settles, and a module may import the class.
+async function packaged() {
+    const page = await open(800, 600);
+    const { width, height, samples } = await page.evaluate('state.last');
+    assert.deepEqual([height, samples], [480, 8]);
+    assert.ok(width > 700 && width <= 800);
+    const before = await shown(page);
+    assert.ok(before.length > 20000);
+    await change(page, 'viewer.orbit.turn(100, 0, 480); viewer.moved()');
+    assert.notEqual(await shown(page), before);
+    assert.ok(await page.evaluate(`import('./node_modules/vcp-viewer/vcp-viewer.js').then(({ VcpViewer }) => viewer instanceof VcpViewer)`));
+    await page.picture(path.join(pictures, 'page.png'));
+    await closeGood(page);
+}
+
 /// The network goes before all has come, and comes back.
 async function returns() {
     const page = await open(320, 200, { fault: 'gone' });
@@ -485,6 +546,13 @@ async function returns() {
     assert.equal(await page.evaluate('state.problem'), null);
     assert.equal(await status(page), '');
     await page.close();
+    // So it is where it was not there at first.
+    const late = await open(320, 200, { fault: 'down' });
+    assert.match(await status(late), /cannot be reached/);
+    wrong = '';
+    await change(late, `dispatchEvent(new Event('online'))`);
+    assert.deepEqual([await status(late), await late.evaluate('viewer.info.triangles > 0')], ['', true]);
+    await late.close();
 }
 
 /// The scan lies on another server than the page.
@@ -621,6 +689,8 @@ if (kind === 'short') {
     await step(measures, 'whole', 320, 200);
     await step(shares, false);
     for (const run of [moves, persists]) await step(run);
+} else if (kind === 'package') {
+    await step(packaged);
 } else if (kind === 'shards') {
     await step(showsShards);
 } else if (kind === 'images') {
@@ -638,7 +708,7 @@ if (kind === 'short') {
     if (scan.length > kLead) {
         for (const name of Object.keys(kCameras)) await step(measures, name, 320, 200);
         await step(shares, true);
-        for (const run of [moves, persists, annotates, returns, crosses, serves, servesCompressed]) await step(run);
+        for (const run of [moves, persists, recovers, annotates, returns, crosses, serves, servesCompressed]) await step(run);
     }
 }
 await browser.close();

@@ -29,6 +29,23 @@ if [ "$browser" = firefox ]; then
     exit
 fi
 for triangles in 10000 60000 300000; do page $triangles ""; done
+# The package for npm, as it is unpacked, and a page written by hand.
+if command -v npm >/dev/null; then
+    package=sitepackage/node_modules/vcp-viewer
+    mkdir -p "$package" picturespackage
+    npm pack "$(cd "$web" && pwd)" --offline --silent >/dev/null
+    tar -xzf vcp-viewer-*.tgz -C "$package" --strip-components 1
+    cp site60000/scan.vcp sitepackage
+    cat >sitepackage/index.html <<'PAGE'
+<!doctype html>
+<title>By hand</title>
+<link rel="icon" href="data:,">
+<script type="module" src="node_modules/vcp-viewer/vcp-viewer.js"></script>
+<h1>A scan</h1>
+<vcp-viewer src="scan.vcp" style="height: 480px"></vcp-viewer>
+PAGE
+    "$node" "$here/page_test.mjs" "$browser" "$vcp" sitepackage picturespackage package
+fi
 "$vcp" shard scan.vcp -o shards --size 64K --progress none >/dev/null
 "$vcp" publish shards -o siteshards --viewer "$web" >/dev/null
 cp scan.vcp siteshards/whole.vcp

@@ -51,6 +51,7 @@ rm -rf shards
     textured/channels.vcp
 "$node" "$here/module_test.mjs" "$folder" scan.vcp hostile.bin whole close far tolerant
 "$node" "$here/image_test.mjs" "$folder" textured
+"$node" "$here/settle_test.mjs" "$folder" 30 1 large.vcp textured/lossless.vcp textured/jpeg.vcp
 # The folder is a package for npm that needs no other one.
 if command -v npm >/dev/null; then
     (cd "$web" && npm pack --dry-run --json --offline 2>/dev/null) >package_files.json

@@ -14,6 +14,8 @@
 #include <optional>
 #include <string>
 
+#include <glm/vector_relational.hpp>
+
 #include "octree/dataset_reader.h"
 #include "render/environment_light.h"
 #include "render/frame_setup.h"
@@ -225,6 +227,21 @@ int beginSample(const BandFrame& frame, std::vector<CutPage> cut) {
                               frame.listens ? 1.0 : 0.0};
     std::copy(std::begin(numbers), std::end(numbers), opened.numbers);
     return int(BandCaster::bandsOf(frame.request));
+}
+
+/// Returns by how much the surface that is drawn may be off at a place, world units: the largest certified error of the
+/// pages that are drawn around it, those of the finest surface at least.
+double errorAt(glm::dvec3 place) {
+    const Dataset& dataset = *opened.dataset;
+    double error = dataset.header.certifiedErrorMax;
+    for (const CutPage& page : cutPages(residency())) {
+        // Slabs of neighbours are blended across a leaf.
+        const double cell = dataset.cellOf(page.entry.level);
+        const glm::dvec3 low = dataset.originOf(page.entry) - cell, high = low + dataset.edgeOf(page.entry) + 2 * cell;
+        if (glm::all(glm::lessThanEqual(low, place)) && glm::all(glm::lessThanEqual(place, high)))
+            error = std::max(error, double(page.entry.certifiedError));
+    }
+    return error;
 }
 
 }  // namespace
@@ -558,9 +575,7 @@ EXPORT(vcp_pick) int vcp_pick(int x, int y) {
         depthAt(*opened.dataset, request, cutPages(residency()), opened.hasColour, uint32_t(x), uint32_t(y));
     if (!(depth < std::numeric_limits<float>::infinity())) return 0;
     const PixelHit hit = pixelHit(request, {uint32_t(x), uint32_t(y)}, double(depth), {});
-    const double pixel = hit.depth * 2 * std::tan(request.camera.verticalFov / 2) / request.height;
-    const double error = std::max(opened.errorPixels * pixel, opened.dataset->header.certifiedErrorMax);
-    const double numbers[] = {hit.position.x, hit.position.y, hit.position.z, hit.depth, error};
+    const double numbers[] = {hit.position.x, hit.position.y, hit.position.z, hit.depth, errorAt(hit.position)};
     std::copy(std::begin(numbers), std::end(numbers), opened.numbers);
     return 1;
 }
