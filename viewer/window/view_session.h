@@ -77,7 +77,8 @@ public:
     /// Keeps a size that was set by hand, not by the window system.
     void keepWindowSize(glm::ivec2 size) { changes_.windowSize = size; }
 
-    /// Opens instead of what is shown, as soon as it is built and its directory read. Cancels what was being opened.
+    /// Opens instead of what is shown, as soon as it is built and its directory read. Cancels what was being opened. Of
+    /// several .vcp files and addresses those that cannot be opened are reported, and the others shown.
     void open(std::vector<std::string> inputs);
     /// Returns what is being opened; null when nothing is.
     [[nodiscard]] SceneOpening* opening() { return opening_.get(); }
@@ -233,6 +234,7 @@ private:
     void annotate(glm::dvec3 position);
     void keepPoints();
     Result<void> show(OpenedScene open, const std::vector<std::string>& inputs);
+    Result<void> openInViewer(const OpenedScene& open, const OrbitCamera& camera, std::string name);
     void takeSurroundings(const EnvironmentChoice& choice);
     void takePicked();
     void endPick();
