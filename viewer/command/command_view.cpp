@@ -104,8 +104,7 @@ Result<int> run(ViewCommand command, const CLI::App& app) {
     }
     const auto isGiven = [&](const char* option) { return app.count(option) > 0; };
     applyRemembered(command.render, options.session.user,
-                    {.up = isGiven("--up"),
-                     .shadows = isGiven("--shadows"),
+                    {.shadows = isGiven("--shadows"),
                      .occlusion = isGiven("--occlusion"),
                      .errorPixels = isGiven("--error-pixels"),
                      .budget = isGiven("--budget")});

@@ -46,7 +46,7 @@ void applyRemembered(RenderSettings& render, const UserSettings& user, const Giv
     if (!given.budget) render.budgetBytes = user.budgetBytes;
     if (!given.shadows) render.shading.shadows = user.shadows;
     if (!given.occlusion && user.occlusion) render.shading.occlusionRays = kUsualOcclusionRays;
-    if (!given.up) render.up = user.up;
+    render.usualUp = user.up;
 }
 
 Result<std::unique_ptr<ViewSession>> ViewSession::create(const SessionOptions& options,
@@ -69,7 +69,7 @@ Result<std::unique_ptr<ViewSession>> ViewSession::create(const SessionOptions& o
 }
 
 ViewSession::ViewSession(const SessionOptions& options, std::unique_ptr<Viewer> viewer)
-    : options_(options), user_(options.user), viewer_(std::move(viewer)), seenLooks_(looks()), up_(options.render.up) {
+    : options_(options), user_(options.user), viewer_(std::move(viewer)), seenLooks_(looks()) {
     takeSurroundings(options.render.environment);
     note("");
     useThemesBackground();
@@ -130,13 +130,13 @@ Result<void> ViewSession::openInViewer(const OpenedScene& open, const OrbitCamer
 Result<void> ViewSession::show(OpenedScene open, const std::vector<std::string>& inputs) {
     const glm::ivec2 size = glm::max(viewer_->size(), glm::ivec2(1));
     OrbitCamera camera;
-    camera.up = up_;
+    camera.up = options_.render.upFor(open);
     camera.look(View::Fit, open.bounds(), size, viewer_->covered());
     // The command line's settings apply only to what it opens.
     const bool isFirst = !wasShown_;
     const bool takesOwn = !isFirst || options_.render.isFit();
     if (isFirst) {
-        const auto asked = options_.render.cameraFor(open.bounds(), size, viewer_->covered());
+        const auto asked = options_.render.cameraFor(open.bounds(), camera.up, size, viewer_->covered());
         if (asked)
             camera = *asked;
         else
@@ -197,7 +197,7 @@ void ViewSession::takePreview(double now) {
     if (!opening_ || viewer_->isOpen() || !preview_.update(opening_->sample(), now)) return;
     if (isPreviewMoved()) return;
     OrbitCamera camera;
-    camera.up = up_;
+    camera.up = options_.render.upFor(preview_.bounds());
     camera.look(View::Fit, preview_.bounds(), glm::max(viewer_->size(), glm::ivec2(1)), viewer_->covered());
     viewer_->foresee(preview_.bounds(), camera);
     framed_ = viewer_->camera().current();
@@ -229,11 +229,18 @@ Result<NextStep> ViewSession::update(double now) {
 }
 
 void ViewSession::act(ViewerAction action) {
-    // A camera of a scene or a bookmark brings its own axis: only this action is by hand.
     if (action == ViewerAction::ToggleUpAxis && viewer_->isOpen())
-        changes_.up = up_ = viewer_->camera().up == UpAxis::Y ? UpAxis::Z : UpAxis::Y;
+        takeUp(viewer_->camera().up == UpAxis::Y ? UpAxis::Z : UpAxis::Y);
     viewer_->act(action);
     if (const std::string why = viewer_->whyWithout(action); !why.empty()) note(why);
+}
+
+/// Has the axis remembered for scans whose shape does not say which it is. A camera of a scene or a bookmark brings its
+/// own, which is not by hand.
+void ViewSession::takeUp(UpAxis up) {
+    if (options_.render.up) options_.render.up = up;
+    if (open_.surfaces.surfaces.empty() && upOf(open_.bounds())) return;
+    changes_.up = options_.render.usualUp = up;
 }
 
 void ViewSession::toggleWireframe() {

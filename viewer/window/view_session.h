@@ -30,7 +30,7 @@ namespace vcp {
 
 /// The settings that were given for this run: what is remembered does not replace them.
 struct GivenSettings {
-    bool up = false, shadows = false, occlusion = false, errorPixels = false, budget = false;
+    bool shadows = false, occlusion = false, errorPixels = false, budget = false;
 };
 /// Uses remembered values for settings that were not given.
 void applyRemembered(RenderSettings& render, const UserSettings& user, const GivenSettings& given);
@@ -227,6 +227,7 @@ private:
     ViewSession(const SessionOptions& options, std::unique_ptr<Viewer> viewer);
     [[nodiscard]] Looks looks() const;
     void noteChanges();
+    void takeUp(UpAxis up);
     void useThemesBackground();
     void takeOpened();
     void takePreview(double now);
@@ -255,7 +256,6 @@ private:
     SettingsChanges changes_;
     std::unique_ptr<Viewer> viewer_;
     Looks seenLooks_;  // as of the last update
-    UpAxis up_;        // for what is opened next
     std::unique_ptr<SceneOpening> opening_;
     MeshPreview preview_;
     std::optional<Camera> framed_;  // how the preview was framed last; a person may have moved the camera since

@@ -116,8 +116,7 @@ TEST_F(RememberingSessionTest, OptionsHoldForOneRun) {
     render.budgetBytes = 64 << 20;
     render.shading.lightFollowsCamera = false;
     render.sections = {*parsePlane("x<50%")};
-    Remembering given =
-        begin({.up = true, .shadows = true, .occlusion = true, .errorPixels = true, .budget = true}, render);
+    Remembering given = begin({.shadows = true, .occlusion = true, .errorPixels = true, .budget = true}, render);
     given.open(ball());
     EXPECT_EQ(given.session->viewer().camera().up, UpAxis::Z);
     EXPECT_TRUE(given.session->viewer().shading().shadows);
@@ -137,13 +136,36 @@ TEST_F(RememberingSessionTest, OptionsHoldForOneRun) {
         EXPECT_EQ(json.find(field), std::string::npos) << field << " in " << json;
 }
 
+TEST_F(RememberingSessionTest, TheAxisChosenByHandIsForScansWhoseShapeDoesNotSay) {
+    std::ofstream(*folder_ / "terrain.obj") << "v 0 0 0\nv 9 0 1\nv 9 9 0\nv 0 9 1\nf 1 2 3\nf 1 3 4\n";
+    BuildOptions build;
+    build.inputs = {*folder_ / "terrain.obj"};
+    build.output = *folder_ / "terrain.vcp";
+    ASSERT_TRUE(buildOctree(build));
+    Remembering first = begin();
+    first.open(build.output);
+    EXPECT_EQ(first.session->viewer().camera().up, UpAxis::Z);
+    first.session->act(ViewerAction::ToggleUpAxis);
+    first.rest();
+    EXPECT_EQ(first.session->viewer().camera().up, UpAxis::Y);
+    first.open(ball());
+    EXPECT_EQ(first.session->viewer().camera().up, UpAxis::Y);
+    EXPECT_FALSE(first.session->changes().up) << "of terrain it says nothing about others";
+    first.session->act(ViewerAction::ToggleUpAxis);
+    end(first);
+
+    Remembering second = begin();
+    second.open(ball());
+    EXPECT_EQ(second.session->viewer().camera().up, UpAxis::Z);
+}
+
 TEST_F(RememberingSessionTest, WhatHandsChangeIsRememberedAlsoAfterOptions) {
     RenderSettings render;
     render.up = UpAxis::Z;
     render.shading.shadows = true;
     render.errorPixels = 7;
     render.budgetBytes = 64 << 20;
-    Remembering first = begin({.up = true, .shadows = true, .errorPixels = true, .budget = true}, render);
+    Remembering first = begin({.shadows = true, .errorPixels = true, .budget = true}, render);
     first.open(ball());
     first.session->act(ViewerAction::ToggleUpAxis);  // to y, which is the default: nothing of it shows below
     first.rest();
