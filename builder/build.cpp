@@ -27,6 +27,7 @@
 #include "builder/progress_meter.h"
 #include "builder/slab_pages.h"
 #include "builder/spill/journal.h"
+#include "octree/io/output_claim.h"
 #include "octree/io/output_file.h"
 
 namespace vcp {
@@ -99,6 +100,7 @@ private:
     }
 
     Result<void> stages() {
+        VCP_TRY_ASSIGN(claim_, OutputClaim::take(options_.output));
         // A wrong output is found before an hour's work, not after it.
         VCP_TRY(checkOutput(options_.output, OutputKind::Dataset, rules()));
         VCP_TRY(checkTempFolder());
@@ -624,6 +626,7 @@ private:
     }
 
     const BuildOptions& options_;
+    OutputClaim claim_;
     MemoryPlan memory_;
     ProgressMeter meter_;
     TempSpace space_;

@@ -12,6 +12,7 @@
 
 #include "builder/ingest.h"
 #include "builder/mesh/open_mesh.h"
+#include "octree/io/output_claim.h"
 #include "octree/io/output_file.h"
 #include "octree/vcp_writer.h"
 
@@ -143,6 +144,7 @@ Result<PaperFile> paperFile(const PaperCaster& octree, const IndexedMesh& mesh) 
 }
 
 Result<BuildReport> buildPaperFile(const BuildOptions& options, const PaperOptions& paper) {
+    VCP_TRY_ASSIGN(const auto claim, OutputClaim::take(options.output));
     VCP_TRY(checkOutput(options.output, OutputKind::Dataset, rulesOf(options)));
     const auto began = std::chrono::steady_clock::now();
     const Stages stages(options);

@@ -4,6 +4,8 @@
 #include <unistd.h>
 #include <algorithm>
 #include <cerrno>
+#include <charconv>
+#include <csignal>
 #include <cstdio>
 #include <system_error>
 
@@ -17,6 +19,8 @@ namespace vcp {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr const char* kUnfinished = ".unfinished-";
 
 Error io(const fs::path& file, const char* what, const std::error_code& failed) {
     return systemError(file, what, failed.value());
@@ -40,6 +44,51 @@ Result<void> checkReplaceable(const fs::path& folder, const FolderRules& rules) 
         for (const fs::path& input : rules.inputs)
             if (isSameFile(entry.path(), input))
                 return refuse(fmt::format("holds {}, which is read; choose another folder", name));
+    }
+    return {};
+}
+
+/// Whether a folder holds nothing but files of the names that are written, or parts of them.
+bool holdsOnlyOurs(const fs::path& folder, const FolderRules& rules) {
+    std::error_code failed;
+    for (const fs::directory_entry& entry : fs::directory_iterator(folder, failed)) {
+        std::string name = entry.path().filename().string();
+        if (constexpr std::string_view partial = ".partial"; name.ends_with(partial))
+            name.resize(name.size() - partial.size());
+        if (!rules.isOurs(name) || !entry.is_regular_file(failed) || entry.is_symlink(failed)) return false;
+    }
+    return !failed;
+}
+
+/// Removes what was left of a folder by a process that is gone. Errors: Io (the process is there, and has it locked).
+Result<void> removeLeft(const fs::path& left, int process, const fs::path& folder, const FolderRules& rules) {
+    const FileDescriptor held(::open(left.c_str(), O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC));
+    if (!held.isOpen()) return {};
+    const NameLock lock = lockName(held.number(), left);
+    if (lock == NameLock::Held)
+        return Error{
+            .code = ErrorCode::Io,
+            .message = fmt::format("process {} is writing this folder; wait for it, or choose another", process),
+            .file = folder.string()};
+    // A file system without locks has them all taken.
+    const bool isGone = ::kill(process, 0) != 0 && errno == ESRCH;
+    std::error_code ignored;
+    if (lock == NameLock::Taken && isGone && holdsOnlyOurs(left, rules)) fs::remove_all(left, ignored);
+    return {};
+}
+
+Result<void> removeLeftovers(const fs::path& folder, const FolderRules& rules) {
+    const fs::path beside = folder.has_parent_path() ? folder.parent_path() : fs::path(".");
+    const std::string start = folder.filename().string() + kUnfinished;
+    std::error_code failed;
+    for (const fs::directory_entry& entry : fs::directory_iterator(beside, failed)) {
+        const std::string name = entry.path().filename().string();
+        if (!name.starts_with(start)) continue;
+        int process = 0;
+        const char* const end = name.data() + name.size();
+        const auto number = std::from_chars(name.data() + start.size(), end, process);
+        if (number.ec == std::errc() && number.ptr == end && process > 0)
+            VCP_TRY(removeLeft(entry.path(), process, folder, rules));
     }
     return {};
 }
@@ -82,11 +131,14 @@ Result<OutputFolder> OutputFolder::create(const fs::path& named, const FolderRul
                      .message = "has no name of its own, under which a folder could be made; name one in it",
                      .file = named.string()};
     VCP_TRY(checkReplaceable(made.folder_, rules));
-    const fs::path unfinished = fs::path(made.folder_) += fmt::format(".unfinished-{}", ::getpid());
+    VCP_TRY(removeLeftovers(made.folder_, rules));
+    const fs::path unfinished = fs::path(made.folder_) += fmt::format("{}{}", kUnfinished, ::getpid());
     std::error_code failed;
     if (!fs::create_directory(unfinished, failed))
         return systemError(unfinished, "cannot be made", failed ? failed.value() : EEXIST);
     made.unfinished_ = unfinished;
+    made.lock_ = FileDescriptor(::open(unfinished.c_str(), O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC));
+    if (made.lock_.isOpen()) static_cast<void>(lockName(made.lock_.number(), unfinished));
     return made;
 }
 
@@ -98,6 +150,7 @@ OutputFolder::~OutputFolder() {
 OutputFolder::OutputFolder(OutputFolder&& other) noexcept
     : folder_(std::move(other.folder_)),
       unfinished_(std::exchange(other.unfinished_, {})),
+      lock_(std::move(other.lock_)),
       rules_(std::move(other.rules_)) {}
 
 Result<void> OutputFolder::commit() {

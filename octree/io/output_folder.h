@@ -1,6 +1,7 @@
 // OutputFolder: a folder of files that appears under its name whole, and never at the cost of something else.
 //
-// The files go into a new folder beside it, OUT.unfinished-PID; commit() gives that the name. A folder that is there
+// The files go into a new folder beside it, OUT.unfinished-PID, which is locked; commit() gives that the name. What a
+// process that was killed left of that kind goes, where all in it has names that are written. A folder that is there
 // already is replaced only where it is empty, or where that is asked for and every file in it has one of the names that
 // are written, and none is a file that is read. Then the two are exchanged, and the old one goes.
 #pragma once
@@ -11,6 +12,7 @@
 #include <string_view>
 #include <vector>
 
+#include "octree/io/file_descriptor.h"
 #include "octree/io/result.h"
 
 namespace vcp {
@@ -26,7 +28,7 @@ struct FolderRules {
 /// An output folder while it is written. Without commit() nothing is left and nothing is replaced.
 class OutputFolder {
 public:
-    /// Errors: Usage, with what stands in the way; Io.
+    /// Errors: Usage, with what stands in the way; Io (also where another process is writing it, which is named).
     static Result<OutputFolder> create(const std::filesystem::path& named, const FolderRules& rules);
     ~OutputFolder();
     OutputFolder(OutputFolder&& other) noexcept;
@@ -44,6 +46,7 @@ private:
         : folder_(std::move(folder)), rules_(std::move(rules)) {}
 
     std::filesystem::path folder_, unfinished_;
+    FileDescriptor lock_;  ///< of the unfinished folder
     FolderRules rules_;
 };
 

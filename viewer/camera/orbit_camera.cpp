@@ -59,11 +59,36 @@ std::array<glm::dvec3, 8> cornersOf(const Box& box) {
     return corners;
 }
 
+// Up to this part of the shorter other side a box is flat; a scan is tall from this many times the longer one.
+constexpr double kFlat = 0.25, kTall = 1.5;
+// Map coordinates are so many diagonals from the origin, and heights at most such a part of that.
+constexpr double kFarDiagonals = 10, kHeightPart = 0.1;
+
+bool isFlatAlongZ(const Box& box) {
+    const glm::dvec3 extent = box.high - box.low;
+    const double shorter = std::min(extent.x, extent.y);
+    return shorter > 0 && extent.z <= kFlat * shorter;
+}
+
+bool isOnMap(const Box& box) {
+    const glm::dvec3 away = glm::abs(box.centre());
+    const double nearer = std::min(away.x, away.y);
+    return nearer > kFarDiagonals * box.diagonal() && away.z < kHeightPart * nearer;
+}
+
 bool finite(glm::dvec3 v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
 
 }  // namespace
 
 glm::dvec3 directionOf(UpAxis up) { return up == UpAxis::Y ? glm::dvec3(0, 1, 0) : glm::dvec3(0, 0, 1); }
+
+std::optional<UpAxis> upOf(const Box& box) {
+    if (isOnMap(box) || isFlatAlongZ(box)) return UpAxis::Z;
+    const glm::dvec3 extent = box.high - box.low;
+    if (extent.z > 0 && extent.z >= kTall * std::max(extent.x, extent.y)) return UpAxis::Z;
+    if (extent.y > 0 && extent.y >= kTall * std::max(extent.x, extent.z)) return UpAxis::Y;
+    return std::nullopt;
+}
 
 glm::dquat facing(glm::dvec3 forward, glm::dvec3 up) {
     const glm::dvec3 back = -glm::normalize(forward);
@@ -209,6 +234,8 @@ void OrbitCamera::look(View view, const Box& box, glm::ivec2 size, const Picture
     const glm::dvec3 right = glm::cross(upward, front);
     switch (view) {
         case View::Fit:
+            orientation = facing(up == UpAxis::Z && isFlatAlongZ(box) ? -(front + upward) : -front, upward);
+            break;
         case View::Front:
             orientation = facing(-front, upward);
             break;

@@ -58,7 +58,13 @@ enum class UpAxis { Y, Z };
 /// Returns its direction in the world.
 glm::dvec3 directionOf(UpAxis up);
 
-/// Standard views of a box. `Fit` is the view a dataset opens with: the front.
+/// Returns the axis that points up in a scan, as far as the box about it says: z where it lies far from the origin
+/// along x and y but not along z, as map coordinates do; where it is flat along z, as terrain is; and where it is half
+/// as long again along z as along the others, as a statue that stands. y where it is so long along y. Else nothing.
+std::optional<UpAxis> upOf(const Box& box);
+
+/// Standard views of a box. `Fit` is the view a dataset opens with: the front; where z is up and the box is flat along
+/// z, halfway between the front and the top.
 enum class View { Fit, Front, Back, Left, Right, Top, Bottom, Isometric };
 
 /// How much of a picture is covered along its sides, in pixels: what is fitted goes into the rest. Where less than half

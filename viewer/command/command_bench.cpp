@@ -301,8 +301,10 @@ RunCommand addBenchMeso(CLI::App& bench) {
         ->expected(0, 1)
         ->default_str(kSweep)
         ->check(CLI::IsMember({kSweep, kTessellation}));
-    app->add_option("--device", command->device,
-                    "March and remesh on a Vulkan device: an index or a part of a name; without one the best [the CPU]")
+    app->add_option(
+           "--device", command->device,
+           "March and remesh on a Vulkan device: an index, or =NAME, a part of its name; without either the best [the "
+           "CPU]")
         ->type_name("DEVICE")
         ->expected(0, 1)
         ->default_str(kBestDevice);

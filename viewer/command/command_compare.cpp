@@ -194,7 +194,7 @@ private:
     Result<void> writePicture(const std::string& output, const DeviationTarget& target, const Deviation& deviation,
                               const Box& bounds) {
         const glm::ivec2 drawn(command_.size.x - int(scaleWidth(uint32_t(command_.size.x))), command_.size.y);
-        VCP_TRY_ASSIGN(const auto camera, command_.render.cameraFor(bounds, drawn));
+        VCP_TRY_ASSIGN(const auto camera, command_.render.cameraFor(bounds, command_.render.upFor(bounds), drawn));
         const MeshBvh surface(a_.mesh);
         VCP_TRY_ASSIGN(const auto picture, drawDeviation(surface, target, deviation,
                                                          {.camera = camera.current(),

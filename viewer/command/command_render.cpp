@@ -184,7 +184,9 @@ Result<Json> render(const RenderCommand& command) {
     for (const std::string& warning : open.surfaces.warnings) warnOnTerminal(warning);
     const Box bounds = open.bounds();
     const bool isScenes = command.render.isFit() && scene.camera;
-    VCP_TRY_ASSIGN(const auto camera, isScenes ? *scene.camera : command.render.cameraFor(bounds, command.size));
+    VCP_TRY_ASSIGN(const auto camera, isScenes
+                                          ? *scene.camera
+                                          : command.render.cameraFor(bounds, command.render.upFor(open), command.size));
     const bool isFitted = !isScenes && std::holds_alternative<View>(command.render.camera);
     VCP_TRY_ASSIGN(const auto course, courseOf(command, camera, open, isFitted));
     VCP_TRY_ASSIGN(const auto paintOver, paintOverOf(command, open, course.cameras));

@@ -1,5 +1,6 @@
 // vcp view: the window.
 #include <cstdio>
+#include <optional>
 #include <system_error>
 
 #include <fmt/format.h>
@@ -52,7 +53,20 @@ Json toJson(const WindowReport& report) {
             {"problem", report.problem}};
 }
 
-/// Finds errors before a window is opened: a missing mesh, a .vcp that is none.
+/// Finds errors of an input before a window is opened.
+Result<void> checkInput(const std::string& input, const RenderSettings& render, bool isAlone) {
+    if (isHttpUrl(input)) return {};
+    if (looksLikeDataset(input)) {
+        VCP_TRY_ASSIGN(const auto open, openDataset(input, render.source));
+        return isAlone ? render.checkFor(*open.dataset) : Result<void>();
+    }
+    if (std::error_code failed; !std::filesystem::exists(input, failed))
+        return Error{.code = ErrorCode::Io, .message = "cannot be opened: there is no such file", .file = input};
+    return {};
+}
+
+/// Finds errors that leave nothing to show: a missing mesh, a .vcp that is none. Of several .vcp files one is enough,
+/// and the window says what is wrong with the others.
 Result<void> checkInputs(const ViewCommand& command) {
     std::vector<std::string> inputs = command.inputs;
     VCP_TRY_ASSIGN(const auto kind, kindOf(inputs));
@@ -61,16 +75,13 @@ Result<void> checkInputs(const ViewCommand& command) {
         inputs.clear();
         for (const SceneDataset& each : scene.datasets) inputs.push_back(each.file);
     }
+    std::optional<Error> first;
     for (const std::string& input : inputs) {
-        if (isHttpUrl(input)) continue;
-        if (looksLikeDataset(input)) {
-            VCP_TRY_ASSIGN(const auto open, openDataset(input, command.render.source));
-            if (inputs.size() == 1) VCP_TRY(command.render.checkFor(*open.dataset));
-        } else if (std::error_code failed; !std::filesystem::exists(input, failed)) {
-            return Error{.code = ErrorCode::Io, .message = "cannot be opened: there is no such file", .file = input};
-        }
+        const auto checked = checkInput(input, command.render, inputs.size() == 1);
+        if (checked && kind == InputKind::Datasets) return {};
+        if (!checked && !first) first = checked.error();
     }
-    return {};
+    return first ? Result<void>(*first) : Result<void>();
 }
 
 void warn(const std::string& line) { fmt::print(stderr, "warning: {}\n", line); }
@@ -93,8 +104,7 @@ Result<int> run(ViewCommand command, const CLI::App& app) {
     }
     const auto isGiven = [&](const char* option) { return app.count(option) > 0; };
     applyRemembered(command.render, options.session.user,
-                    {.up = isGiven("--up"),
-                     .shadows = isGiven("--shadows"),
+                    {.shadows = isGiven("--shadows"),
                      .occlusion = isGiven("--occlusion"),
                      .errorPixels = isGiven("--error-pixels"),
                      .budget = isGiven("--budget")});

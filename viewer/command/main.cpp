@@ -9,6 +9,7 @@
 #include "viewer/command/commands.h"
 #include "viewer/command/manual/help_text.h"
 #include "viewer/command/option_names.h"
+#include "viewer/command/optional_values.h"
 #include "viewer/command/terminal/suggestion.h"
 #include "viewer/command/terminal/terminal_text.h"
 
@@ -135,7 +136,8 @@ int runCommandLine(int argc, char** argv) {
                                            addDevices(vcp), addHelp(vcp),   addManual(vcp),    addCompletions(vcp)};
     groupHelp(vcp);
     try {
-        vcp.parse(argc, argv);
+        const auto words = withOptionalValues(vcp, {argv + 1, argv + argc});
+        vcp.parse(std::vector<std::string>(words.rbegin(), words.rend()));
     } catch (const CLI::CallForHelp&) {
         return printLine(vcp.help()) ? 0 : kFailed;
     } catch (const CLI::CallForAllHelp&) {

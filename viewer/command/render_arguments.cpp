@@ -58,11 +58,12 @@ void addEnvironment(CLI::App& app, EnvironmentChoice& environment) {
         ->check(CLI::Range(0.0, double(kStrongestEnvironment)));
 }
 
-void addUp(CLI::App& app, UpAxis& up) {
+void addUp(CLI::App& app, std::optional<UpAxis>& up) {
     const auto take = [&up](const std::string& axis) { up = axis == "z" ? UpAxis::Z : UpAxis::Y; };
-    app.add_option_function<std::string>("--up", take, "The axis that points up in the standard views: y or z")
+    app.add_option_function<std::string>(
+           "--up", take,
+           "The axis that points up in the standard views: y or z [as the shape of the scan says, else y]")
         ->type_name("AXIS")
-        ->default_str("y")
         ->check(CLI::IsMember({"y", "z"}));
 }
 
@@ -108,11 +109,15 @@ void addRenderSettings(CLI::App& app, RenderSettings& settings) {
         ->expected(0, 1)
         ->default_str(std::to_string(kUsualOcclusionRays))
         ->check(CLI::Range(0, int(kMostOcclusionRays)));
-    addParsedList(app, "--section", settings.sections, parsePlane, "like \"x<0.2\", \"z>50%\" or \"a,b,c,d\"",
+    // What is parsed so far is in the list.
+    const auto parse = [&sections = settings.sections](std::string_view text) {
+        return sections.size() < kMostSections ? parsePlane(text) : std::nullopt;
+    };
+    addParsedList(app, "--section", settings.sections, parse,
+                  "like \"x<0.2\", \"z>50%\" or \"a,b,c,d\", at most 6 times",
                   "Keep one side of a plane: x<0.2, z>50% (of the bounding box), or a,b,c,d for ax + by + cz >= d; up "
                   "to 6 times")
-        ->type_name("PLANE")
-        ->expected(1, int(kMostSections));
+        ->type_name("PLANE");
     app.add_flag("--caps{closed}", settings.caps,
                  "Fill what sections cut open of closed parts, and draw the rest as lines; --caps=all: fill as if all "
                  "were closed")

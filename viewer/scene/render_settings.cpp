@@ -59,10 +59,15 @@ std::vector<SectionPlane> RenderSettings::sectionPlanes(const Box& bounds) const
     return planes;
 }
 
-Result<OrbitCamera> RenderSettings::cameraFor(const Box& bounds, glm::ivec2 size, const PictureMargins& covered) const {
+UpAxis RenderSettings::upFor(const OpenedScene& scene) const {
+    return scene.surfaces.surfaces.empty() ? upFor(scene.bounds()) : up.value_or(usualUp);
+}
+
+Result<OrbitCamera> RenderSettings::cameraFor(const Box& bounds, UpAxis upward, glm::ivec2 size,
+                                              const PictureMargins& covered) const {
     if (const auto* file = std::get_if<std::filesystem::path>(&camera)) return readCamera(*file);
     OrbitCamera fitted;
-    fitted.up = up;
+    fitted.up = upward;
     if (const auto* view = std::get_if<View>(&camera)) fitted.look(*view, bounds, size, covered);
     if (const auto* angles = std::get_if<ViewAngles>(&camera)) fitted.look(*angles, bounds, size, covered);
     return fitted;

@@ -37,7 +37,8 @@ struct RenderSettings {
     double errorPixels = 0.5;
     double colourError = kUsualColourError;  ///< ΔE
     CameraChoice camera = View::Fit;
-    UpAxis up = UpAxis::Y;
+    std::optional<UpAxis> up;    ///< nothing: as the box about a scan says (upOf)
+    UpAxis usualUp = UpAxis::Y;  ///< where that says nothing
     Shading shading;
     EnvironmentChoice environment;  ///< without a source: none was asked for
     bool hasLight = false;          ///< a light was asked for, which there is beside the environment
@@ -59,8 +60,11 @@ struct RenderSettings {
 
     /// Whether no camera was asked for: then a scene's own is used.
     [[nodiscard]] bool isFit() const { return camera == CameraChoice(View::Fit); }
+    /// Returns the axis that points up in scans. Scenes with mesostructure surfaces lie as they are placed.
+    [[nodiscard]] UpAxis upFor(const Box& bounds) const { return up.value_or(upOf(bounds).value_or(usualUp)); }
+    [[nodiscard]] UpAxis upFor(const OpenedScene& scene) const;
     /// Returns the camera of the view, or of the camera file. Errors: those of readCamera.
-    [[nodiscard]] Result<OrbitCamera> cameraFor(const Box& bounds, glm::ivec2 size,
+    [[nodiscard]] Result<OrbitCamera> cameraFor(const Box& bounds, UpAxis upward, glm::ivec2 size,
                                                 const PictureMargins& covered = {}) const;
 };
 

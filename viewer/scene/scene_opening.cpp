@@ -93,14 +93,23 @@ std::vector<PlacedDataset> OpenedScene::placed() const {
 }
 
 Result<OpenedScene> openScene(SceneFile file, const std::string& name,
-                              const std::function<Result<OpenDataset>(const std::string& file)>& open) {
+                              const std::function<Result<OpenDataset>(const std::string& file)>& open, bool leavesOut) {
     OpenedScene scene;
     scene.file = std::move(file);
-    for (const SceneDataset& each : scene.file.datasets) {
+    std::vector<SceneDataset> kept;
+    for (SceneDataset& each : scene.file.datasets) {
         auto opened = open(each.file);
-        if (!opened) return each.from.blamed(opened.error());
-        scene.parts.push_back({*std::move(opened), each.placement});
+        if (opened) {
+            scene.parts.push_back({*std::move(opened), each.placement});
+            kept.push_back(std::move(each));
+            continue;
+        }
+        Error why = each.from.blamed(opened.error());
+        if (!leavesOut || why.code == ErrorCode::Cancelled) return why;
+        scene.leftOut.push_back({each.file, std::move(why)});
     }
+    if (kept.empty() && !scene.leftOut.empty()) return scene.leftOut.front().why;
+    scene.file.datasets = std::move(kept);
     VCP_TRY_ASSIGN(scene.surfaces, makeMesoScene(scene.file.surfaces));
     if (scene.file.environment) {
         VCP_TRY_ASSIGN(scene.environment, openEnvironment(*scene.file.environment));
@@ -121,7 +130,7 @@ void SurfaceChoices::applyTo(SceneFile& scene) const {
 }
 
 Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const BuildOptions& build,
-                              const SourceAccess& access, const SurfaceChoices& instead) {
+                              const SourceAccess& access, const SurfaceChoices& instead, bool leavesOut) {
     VCP_TRY_ASSIGN(const auto kind, kindOf(inputs));
     SceneFile file;
     if (kind == InputKind::Scene) {
@@ -142,13 +151,14 @@ Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const Buil
         filesRead.insert(filesRead.end(), named.begin(), named.end());
     };
     if (kind == InputKind::Meshes) addSideFiles(inputs);
-    auto scene = openScene(std::move(file), inputs.front(), [&](const std::string& each) -> Result<OpenDataset> {
+    const auto open = [&](const std::string& each) -> Result<OpenDataset> {
         if (build.progress && !build.progress({.stage = "opening", .fraction = opened++ / count}))
             return Error::cancelled();
         VCP_TRY_ASSIGN(const auto path, datasetFor({each}, build));
         addSideFiles({each});
         return openDataset(path.string(), access);
-    });
+    };
+    auto scene = openScene(std::move(file), inputs.front(), open, leavesOut && kind == InputKind::Datasets);
     if (scene) scene->filesRead = std::move(filesRead);
     return scene;
 }
@@ -191,7 +201,7 @@ Result<OpenedScene> SceneOpening::open() {
         progress_ = {at.stage, at.fraction, at.triangles, at.seconds};
         return goesOn && !*cancelled_;
     };
-    return openScene(inputs_, build, access_);
+    return openScene(inputs_, build, access_, {}, true);
 }
 
 }  // namespace vcp

@@ -53,6 +53,12 @@ struct OpenDataset {
 /// Opens a dataset. Errors: those of openReader and readDatasetStart.
 Result<OpenDataset> openDataset(const std::string& where, const SourceAccess& access);
 
+/// A dataset that was named and could not be opened.
+struct LeftOut {
+    std::string input;
+    Error why;
+};
+
 struct OpenedScene {
     struct Part {
         OpenDataset open;
@@ -62,6 +68,7 @@ struct OpenedScene {
     MesoScene surfaces;                            ///< made from the file's surfaces
     std::optional<EnvironmentLight> environment;   ///< of the file's
     SceneFile file;                                ///< light, camera and sections of a scene file; empty without one
+    std::vector<LeftOut> leftOut;                  ///< in the order given; only where that is allowed
     std::vector<std::filesystem::path> filesRead;  ///< files that no output may replace; may include addresses
 
     /// Returns the box about all datasets where they are placed, and the surfaces.
@@ -71,9 +78,11 @@ struct OpenedScene {
 };
 
 /// Opens the datasets of a scene, each by `open`, which is given its file, and makes its surfaces. `name` stands for
-/// the scene in errors. Errors: those of `open` and makeMesoScene; InvalidInput, where they lie too far apart.
+/// the scene in errors. `leavesOut`: what cannot be opened is left out, while there is one dataset that can. Errors:
+/// those of `open` and makeMesoScene; InvalidInput, where they lie too far apart.
 Result<OpenedScene> openScene(SceneFile file, const std::string& name,
-                              const std::function<Result<OpenDataset>(const std::string& file)>& open);
+                              const std::function<Result<OpenDataset>(const std::string& file)>& open,
+                              bool leavesOut = false);
 
 /// What holds for all surfaces of a scene.
 struct SurfaceChoices {
@@ -85,15 +94,17 @@ struct SurfaceChoices {
 
 /// Opens one scene file, or .vcp files and addresses, each where it lies by itself, or meshes, which are built into one
 /// dataset in the cache first; meshes of a scene are built one by one. `build`: how, and who is told the progress.
-/// `instead`: for all surfaces, in place of what the scene says. Errors: Usage (.vcp files
-/// among meshes); those of readScene, MeshCache, openDataset and the other openScene.
+/// `instead`: for all surfaces, in place of what the scene says. `leavesOut`: of several .vcp files and addresses,
+/// those that cannot be opened are left out while there is one that can. Errors: Usage (.vcp files among meshes); those
+/// of readScene, MeshCache, openDataset and the other openScene.
 Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const BuildOptions& build,
-                              const SourceAccess& access, const SurfaceChoices& instead = {});
+                              const SourceAccess& access, const SurfaceChoices& instead = {}, bool leavesOut = false);
 
 /// Returns "statue.ply", or "statue.ply and 2 more"; addresses without user and password.
 std::string nameOf(const std::vector<std::string>& inputs);
 
-/// openScene in a thread of its own. One thread may call; destroying it before it is done cancels and waits for the
+/// openScene in a thread of its own; but of several .vcp files and addresses those that cannot be opened are left out,
+/// as long as there is one that can. One thread may call; destroying it before it is done cancels and waits for the
 /// build, or the exchange with a server, to notice.
 class SceneOpening {
 public:

@@ -11,6 +11,16 @@ const add = (a, b, s = 1) => a.map((x, i) => x + s * b[i]);
 export const length = a => Math.hypot(...a);
 export const difference = (a, b) => add(a, b, -1);
 
+/// Returns the axis that points up in a scan, 'y' or 'z', as far as the box about it says: upOf() in
+/// viewer/camera/orbit_camera.cpp, with y where that says nothing.
+export function upOf(boundsMin, boundsMax) {
+    const [x, y, z] = difference(boundsMax, boundsMin), away = boundsMin.map((low, i) => Math.abs(low + boundsMax[i]) / 2);
+    const nearer = Math.min(away[0], away[1]), shorter = Math.min(x, y);
+    const isOnMap = nearer > 10 * Math.hypot(x, y, z) && away[2] < 0.1 * nearer;
+    const isFlat = shorter > 0 && z <= 0.25 * shorter, isTall = z > 0 && z >= 1.5 * Math.max(x, y);
+    return isOnMap || isFlat || isTall ? 'z' : 'y';
+}
+
 export class Orbit {
     constructor() {
         this.up = 'y'; // the axis of the mesh that points up, or 'z'

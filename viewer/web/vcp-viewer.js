@@ -1,5 +1,5 @@
 // <vcp-viewer src="scan.vcp">: a scan in a page, streamed and drawn by a worker.
-import { Light, Orbit, kFieldOfView, difference, length, movingScale, sectionOf } from './camera.js';
+import { Light, Orbit, kFieldOfView, difference, length, movingScale, sectionOf, upOf } from './camera.js';
 import { kMarkup, kStyle } from './markup.js';
 
 const kModes = { lit: 0, clay: 1, unlit: 2, normals: 3, level: 7, error: 8, wireframe: 9 };
@@ -276,8 +276,9 @@ export class VcpViewer extends HTMLElement {
 
     fit() {
         if (!this.info) return;
-        this.orbit.up = this.getAttribute('up') === 'z' ? 'z' : 'y';
-        this.orbit.fit(this.info.boundsMin, this.info.boundsMax, this.clientWidth / Math.max(this.clientHeight, 1));
+        const { boundsMin, boundsMax } = this.info, asked = this.getAttribute('up');
+        this.orbit.up = ['y', 'z'].includes(asked) ? asked : upOf(boundsMin, boundsMax);
+        this.orbit.fit(boundsMin, boundsMax, this.clientWidth / Math.max(this.clientHeight, 1));
         this.moved();
     }
 

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cctype>
+#include <iterator>
+#include <sstream>
 #include <system_error>
 
 #include "viewer/scene/mesh_cache.h"
@@ -22,8 +24,11 @@ std::string lowered(std::string text) {
 
 }  // namespace
 
-bool holds(const std::string& text, const std::string& part) {
-    return lowered(text).find(lowered(part)) != std::string::npos;
+bool holds(const std::string& text, const std::string& words) {
+    const std::string all = lowered(text);
+    std::istringstream typed(lowered(words));
+    return std::all_of(std::istream_iterator<std::string>(typed), {},
+                       [&](const std::string& word) { return all.find(word) != std::string::npos; });
 }
 
 bool looksOpenable(const std::string& name) {
@@ -60,10 +65,10 @@ void FileList::read(const fs::path& folder) {
     });
 }
 
-std::vector<FileList::Entry> FileList::holding(const std::string& part) const {
+std::vector<FileList::Entry> FileList::holding(const std::string& words) const {
     std::vector<Entry> found;
     std::copy_if(entries_.begin(), entries_.end(), std::back_inserter(found),
-                 [&](const Entry& entry) { return holds(entry.name, part); });
+                 [&](const Entry& entry) { return holds(entry.name, words); });
     return found;
 }
 

@@ -24,8 +24,8 @@ public:
 
     [[nodiscard]] const std::filesystem::path& folder() const { return folder_; }
     [[nodiscard]] const std::string& problem() const { return problem_; }
-    /// Returns the entries whose names hold `part`, capitals or not.
-    [[nodiscard]] std::vector<Entry> holding(const std::string& part) const;
+    /// Returns the entries whose names hold all the words.
+    [[nodiscard]] std::vector<Entry> holding(const std::string& words) const;
 
 private:
     std::filesystem::path folder_;
@@ -36,7 +36,7 @@ private:
 /// Whether a file's name is one of a dataset, a scene or a mesh.
 bool looksOpenable(const std::string& name);
 
-/// Whether a text holds another, capitals or not (ASCII).
-bool holds(const std::string& text, const std::string& part);
+/// Whether a text holds each of some words, which blanks part, in any order, capitals or not (ASCII).
+bool holds(const std::string& text, const std::string& words);
 
 }  // namespace vcp

@@ -77,7 +77,7 @@ void Interface::layOutKeys() {
     const float width = ImGui::GetContentRegionAvail().x;
     const bool isWide = width >= units(kTwoColumns);
     const float column = isWide ? (width - units(32)) / 2 : width;
-    const auto isShown = [&](const KeyHelp& each) { return holds(each.keys, typed_) || holds(each.does, typed_); };
+    const auto isShown = [&](const KeyHelp& each) { return holds(fmt::format("{} {}", each.keys, each.does), typed_); };
     const auto layOutGroup = [&](KeyGroup group) {
         const auto keys = keyMap();
         const auto belongs = [&](const KeyHelp& each) { return each.group == group && isShown(each); };

@@ -298,10 +298,14 @@ void Interface::layOutPoints() {
         ImGui::PushID(int(i));
         const float left = ImGui::GetCursorPosX(), room = right - left - units(56);
         if (ImGui::Selectable("##go", false, 0, {room, units(24)})) session_->goToPoint(i);
-        showTip(*look_, {point.text.empty() ? "Go there" : point.text.c_str(), ""});
+        // What does not fit stands in the tip.
+        const std::string title = fitted(point.title, room);
+        std::string tip = title == point.title ? point.text : point.title;
+        if (title != point.title && !point.text.empty()) tip += "\n" + point.text;
+        showTip(*look_, {tip.empty() ? "Go there" : tip.c_str(), ""});
         ImGui::SameLine(left);
         ImGui::AlignTextToFramePadding();
-        text(fitted(point.title, room));
+        text(title);
         ImGui::SameLine(right - units(48));
         if (iconButton(*look_, icon::kEdit, "edit", {"Change title and text", ""}, false, 24)) openPoint(i);
         ImGui::SameLine(0, 0);

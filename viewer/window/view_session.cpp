@@ -46,7 +46,7 @@ void applyRemembered(RenderSettings& render, const UserSettings& user, const Giv
     if (!given.budget) render.budgetBytes = user.budgetBytes;
     if (!given.shadows) render.shading.shadows = user.shadows;
     if (!given.occlusion && user.occlusion) render.shading.occlusionRays = kUsualOcclusionRays;
-    if (!given.up) render.up = user.up;
+    render.usualUp = user.up;
 }
 
 Result<std::unique_ptr<ViewSession>> ViewSession::create(const SessionOptions& options,
@@ -69,7 +69,7 @@ Result<std::unique_ptr<ViewSession>> ViewSession::create(const SessionOptions& o
 }
 
 ViewSession::ViewSession(const SessionOptions& options, std::unique_ptr<Viewer> viewer)
-    : options_(options), user_(options.user), viewer_(std::move(viewer)), seenLooks_(looks()), up_(options.render.up) {
+    : options_(options), user_(options.user), viewer_(std::move(viewer)), seenLooks_(looks()) {
     takeSurroundings(options.render.environment);
     note("");
     useThemesBackground();
@@ -102,35 +102,52 @@ void ViewSession::open(std::vector<std::string> inputs) {
 void ViewSession::takeOpened() {
     if (!opening_ || !opening_->isDone()) return;
     auto opened = opening_->take();
-    const std::vector<std::string> inputs = opening_->inputs();
+    std::vector<std::string> inputs = opening_->inputs();
     opening_.reset();
+    const std::vector<LeftOut> leftOut = opened ? opened->leftOut : std::vector<LeftOut>();
+    for (const LeftOut& each : leftOut) std::erase(inputs, each.input);
     const auto shown = opened ? show(*std::move(opened), inputs) : Result<void>(opened.error());
-    if (shown) return;
-    if (shown.error().code == ErrorCode::Cancelled)
+    if (!shown && shown.error().code == ErrorCode::Cancelled)
         note("cancelled");
-    else
+    else if (!shown)
         say(shown.error().line());
+    else if (!leftOut.empty())
+        say(leftOut.front().why.line() +
+            (leftOut.size() > 1 ? fmt::format(" (and {} more not shown)", leftOut.size() - 1) : ""));
+}
+
+/// Opens a scene in the viewer; where that cannot be, what was shown before stays.
+Result<void> ViewSession::openInViewer(const OpenedScene& open, const OrbitCamera& camera, std::string name) {
+    const auto opened = viewer_->open(open.placed(), open.surfaces, camera, std::move(name));
+    if (opened || shown_.empty()) return opened;
+    if (compared_)
+        endComparison();
+    else
+        VCP_TRY(replaceDatasets(open_.placed()));
+    return opened;
 }
 
 Result<void> ViewSession::show(OpenedScene open, const std::vector<std::string>& inputs) {
     const glm::ivec2 size = glm::max(viewer_->size(), glm::ivec2(1));
     OrbitCamera camera;
-    camera.up = up_;
+    camera.up = options_.render.upFor(open);
     camera.look(View::Fit, open.bounds(), size, viewer_->covered());
     // The command line's settings apply only to what it opens.
-    if (!std::exchange(wasShown_, true)) {
-        const auto asked = options_.render.cameraFor(open.bounds(), size, viewer_->covered());
+    const bool isFirst = !wasShown_;
+    const bool takesOwn = !isFirst || options_.render.isFit();
+    if (isFirst) {
+        const auto asked = options_.render.cameraFor(open.bounds(), camera.up, size, viewer_->covered());
         if (asked)
             camera = *asked;
         else
             say(asked.error().line());
-        viewer_->setSections(options_.render.sectionPlanes(open.bounds()));
-        if (options_.render.isFit() && open.file.camera) camera = *open.file.camera;
-        if (isPreviewMoved()) camera = viewer_->camera();
-    } else {
-        viewer_->setSections({});
-        if (open.file.camera) camera = *open.file.camera;
     }
+    if (takesOwn && open.file.camera) camera = *open.file.camera;
+    if (isFirst && isPreviewMoved()) camera = viewer_->camera();
+    cancelSaving();
+    VCP_TRY(openInViewer(open, camera, nameOf(inputs)));
+    wasShown_ = true;
+    viewer_->setSections(isFirst ? options_.render.sectionPlanes(open.bounds()) : std::vector<SectionPlane>());
     const bool hasOwnSections = viewer_->sections().empty() && !open.file.sections.empty();
     if (hasOwnSections) viewer_->setSections(open.file.sections);
     viewer_->setSectionCaps(std::max(options_.render.caps, hasOwnSections ? open.file.sectionCaps : Caps::None));
@@ -141,7 +158,6 @@ Result<void> ViewSession::show(OpenedScene open, const std::vector<std::string>&
         viewer_->setShading(shading);
         takeSurroundings(open.file.environment.value_or(options_.render.environment));
     }
-    cancelSaving();
     compared_.reset();
     endPick();
     measurement_.clear();
@@ -151,7 +167,6 @@ Result<void> ViewSession::show(OpenedScene open, const std::vector<std::string>&
         finest_->add(part.open.reader, *part.open.dataset, part.placement);
         scans_.push_back({.reader = part.open.reader, .placement = part.placement, .plane = {}, .unit = {}});
     }
-    VCP_TRY(viewer_->open(open.placed(), open.surfaces, camera, nameOf(inputs)));
     viewer_->setLooks(looksOf(open.file));
     if (!open.surfaces.warnings.empty()) note(open.surfaces.warnings.front());
     subject_ = open.legendSubject();
@@ -182,7 +197,7 @@ void ViewSession::takePreview(double now) {
     if (!opening_ || viewer_->isOpen() || !preview_.update(opening_->sample(), now)) return;
     if (isPreviewMoved()) return;
     OrbitCamera camera;
-    camera.up = up_;
+    camera.up = options_.render.upFor(preview_.bounds());
     camera.look(View::Fit, preview_.bounds(), glm::max(viewer_->size(), glm::ivec2(1)), viewer_->covered());
     viewer_->foresee(preview_.bounds(), camera);
     framed_ = viewer_->camera().current();
@@ -214,11 +229,18 @@ Result<NextStep> ViewSession::update(double now) {
 }
 
 void ViewSession::act(ViewerAction action) {
-    // A camera of a scene or a bookmark brings its own axis: only this action is by hand.
     if (action == ViewerAction::ToggleUpAxis && viewer_->isOpen())
-        changes_.up = up_ = viewer_->camera().up == UpAxis::Y ? UpAxis::Z : UpAxis::Y;
+        takeUp(viewer_->camera().up == UpAxis::Y ? UpAxis::Z : UpAxis::Y);
     viewer_->act(action);
     if (const std::string why = viewer_->whyWithout(action); !why.empty()) note(why);
+}
+
+/// Has the axis remembered for scans whose shape does not say which it is. A camera of a scene or a bookmark brings its
+/// own, which is not by hand.
+void ViewSession::takeUp(UpAxis up) {
+    if (options_.render.up) options_.render.up = up;
+    if (open_.surfaces.surfaces.empty() && upOf(open_.bounds())) return;
+    changes_.up = options_.render.usualUp = up;
 }
 
 void ViewSession::toggleWireframe() {

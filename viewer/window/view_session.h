@@ -30,7 +30,7 @@ namespace vcp {
 
 /// The settings that were given for this run: what is remembered does not replace them.
 struct GivenSettings {
-    bool up = false, shadows = false, occlusion = false, errorPixels = false, budget = false;
+    bool shadows = false, occlusion = false, errorPixels = false, budget = false;
 };
 /// Uses remembered values for settings that were not given.
 void applyRemembered(RenderSettings& render, const UserSettings& user, const GivenSettings& given);
@@ -77,7 +77,8 @@ public:
     /// Keeps a size that was set by hand, not by the window system.
     void keepWindowSize(glm::ivec2 size) { changes_.windowSize = size; }
 
-    /// Opens instead of what is shown, as soon as it is built and its directory read. Cancels what was being opened.
+    /// Opens instead of what is shown, as soon as it is built and its directory read. Cancels what was being opened. Of
+    /// several .vcp files and addresses those that cannot be opened are reported, and the others shown.
     void open(std::vector<std::string> inputs);
     /// Returns what is being opened; null when nothing is.
     [[nodiscard]] SceneOpening* opening() { return opening_.get(); }
@@ -226,6 +227,7 @@ private:
     ViewSession(const SessionOptions& options, std::unique_ptr<Viewer> viewer);
     [[nodiscard]] Looks looks() const;
     void noteChanges();
+    void takeUp(UpAxis up);
     void useThemesBackground();
     void takeOpened();
     void takePreview(double now);
@@ -233,6 +235,7 @@ private:
     void annotate(glm::dvec3 position);
     void keepPoints();
     Result<void> show(OpenedScene open, const std::vector<std::string>& inputs);
+    Result<void> openInViewer(const OpenedScene& open, const OrbitCamera& camera, std::string name);
     void takeSurroundings(const EnvironmentChoice& choice);
     void takePicked();
     void endPick();
@@ -253,7 +256,6 @@ private:
     SettingsChanges changes_;
     std::unique_ptr<Viewer> viewer_;
     Looks seenLooks_;  // as of the last update
-    UpAxis up_;        // for what is opened next
     std::unique_ptr<SceneOpening> opening_;
     MeshPreview preview_;
     std::optional<Camera> framed_;  // how the preview was framed last; a person may have moved the camera since

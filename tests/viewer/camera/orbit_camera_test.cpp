@@ -7,6 +7,9 @@
 
 #include <gtest/gtest.h>
 #include <glm/geometric.hpp>
+#include <nlohmann/json.hpp>
+
+#include "viewer/camera/text_file.h"
 
 namespace vcp {
 namespace {
@@ -318,6 +321,43 @@ TEST(OrbitCamera, StandsUpAlsoWhereItLooksAlongTheAxis) {
         EXPECT_NEAR(glm::length(camera.orientation), 1, 1e-9);
         EXPECT_GE(camera.upVector().z, -1e-9);
     }
+}
+
+TEST(UpAxis, TheBoxSaysWhichItIs) {
+    const auto text = readText(VCP_SOURCE_DIR "/tests/viewer/camera/up_axis.json", 1 << 20, "cases", "");
+    ASSERT_TRUE(text);
+    for (const auto& each : nlohmann::json::parse(*text)) {
+        const auto corner = [&](const char* name) {
+            return glm::dvec3(each[name][0].get<double>(), each[name][1].get<double>(), each[name][2].get<double>());
+        };
+        const auto up = upOf({corner("low"), corner("high")});
+        const nlohmann::json found = up ? nlohmann::json(*up == UpAxis::Z ? "z" : "y") : nlohmann::json();
+        EXPECT_EQ(found, each["up"]) << each["what"];
+    }
+}
+
+TEST(OrbitCamera, TerrainIsSeenHalfwayBetweenFrontAndTop) {
+    const Box terrain{{376000, 3788000, 300}, {412000, 3807000, 2300}}, statue{{0, 0, 0}, {1, 1, 2}};
+    OrbitCamera camera;
+    camera.up = UpAxis::Z;
+    camera.look(View::Fit, terrain, {320, 200});
+    EXPECT_LT(glm::distance(camera.forwardVector(), glm::normalize(glm::dvec3(0, 1, -1))), 1e-12);
+    EXPECT_GT(camera.upVector().z, 0.7);
+    for (int i = 0; i < 8; ++i) {
+        const glm::dvec3 corner((i & 1) != 0 ? terrain.low.x : terrain.high.x,
+                                (i & 2) != 0 ? terrain.low.y : terrain.high.y,
+                                (i & 4) != 0 ? terrain.low.z : terrain.high.z);
+        const auto pixel = camera.pixelOf(corner, {320, 200});
+        ASSERT_TRUE(pixel);
+        EXPECT_TRUE(pixel->x >= 0 && pixel->x <= 320 && pixel->y >= 0 && pixel->y <= 200);
+    }
+    camera.look(View::Front, terrain, {320, 200});
+    EXPECT_LT(glm::distance(camera.forwardVector(), glm::dvec3(0, 1, 0)), 1e-12);
+    camera.look(View::Fit, statue, {320, 200});
+    EXPECT_LT(glm::distance(camera.forwardVector(), glm::dvec3(0, 1, 0)), 1e-12);
+    camera.up = UpAxis::Y;
+    camera.look(View::Fit, terrain, {320, 200});
+    EXPECT_LT(glm::distance(camera.forwardVector(), glm::dvec3(0, 0, -1)), 1e-12);
 }
 
 }  // namespace

@@ -1080,5 +1080,40 @@ TEST_F(CommandLine, StressReportsAndItsInvariantsHold) {
     expectFailure(run({"stress", dataset().string(), "--faults", "error=2"}), 2, "error=2");
 }
 
+TEST_F(CommandLine, OptionsThatMayStandAloneTakeNoFileForTheirValue) {
+    const std::string png = *folder_ / "optional.png";
+    const auto draw = [&](std::vector<std::string> words) {
+        fs::remove(png);
+        words.insert(words.begin(), "render");
+        // Into the ball, where there is something to occlude.
+        for (const char* word :
+             {"--section=z<50%", "--size", "32x32", "--samples", "1", "--device", "host", "-o", png.c_str()})
+            words.emplace_back(word);
+        const Ran ran = run(words);
+        EXPECT_EQ(ran.status, 0) << ran.err;
+        return contentOf(png);
+    };
+    const std::string file = dataset();
+    const std::string usual = draw({file, "--occlusion"}), plain = draw({file});
+    EXPECT_NE(usual, plain);
+    EXPECT_EQ(draw({"--occlusion", file}), usual);
+    EXPECT_EQ(draw({"--occlusion=8", file}), usual);
+    EXPECT_EQ(draw({"--occlusion", "8", file}), usual);
+    EXPECT_EQ(draw({file, "--occlusion", "--shadows"}), draw({"--shadows", "--occlusion", "8", file}));
+    EXPECT_EQ(draw({"--occlusion", "0", file}), plain);
+    const std::string cut = draw({file, "--section", "x<50%", "--section", "y<50%"});
+    EXPECT_NE(cut, plain);
+    EXPECT_EQ(draw({"--section", "x<50%", "--section", "y<50%", file}), cut);
+    EXPECT_EQ(draw({"--section", "x<50%", "--section", "y<50%", "--caps", file}),
+              draw({file, "--section", "x<50%", "--section", "y<50%", "--caps=closed"}));
+    expectFailure(run({"render", "--occlusion", "9999", file, "-o", png}), 2, "--occlusion");
+    std::vector<std::string> seven{"render", file, "-o", png};
+    for (int i = 0; i < 7; ++i) seven.insert(seven.end(), {"--section", "x<50%"});
+    expectFailure(run(seven), 2, "at most 6 times");
+    expectFailure(run({"bench", "meso", "--device", "no-such-asset"}), 2, "no-such-asset");
+    expectFailure(run({"bench", "meso", "--remesh", "no-such-asset"}), 2, "no-such-asset");
+    expectFailure(run({"bench", "meso", "--remesh=none", "beads"}), 2, "--remesh");
+}
+
 }  // namespace
 }  // namespace vcp

@@ -27,7 +27,7 @@ TEST(RenderSettings, AnglesSayWhereTheEyeIs) {
     for (const UpAxis up : {UpAxis::Y, UpAxis::Z}) {
         settings.up = up;
         settings.camera = ViewAngles{30, 40, 1};
-        const auto whole = settings.cameraFor(box, {320, 200});
+        const auto whole = settings.cameraFor(box, settings.upFor(box), {320, 200});
         ASSERT_TRUE(whole);
         const glm::dvec3 eye = glm::normalize(whole->position - box.centre());
         const double rise = up == UpAxis::Z ? eye.z : eye.y, away = up == UpAxis::Z ? eye.y : -eye.z;
@@ -41,11 +41,30 @@ TEST(RenderSettings, AnglesSayWhereTheEyeIs) {
             EXPECT_LE(pixel->y, 200);
         }
         settings.camera = ViewAngles{30, 40, 4};
-        const auto large = settings.cameraFor(box, {320, 200});
+        const auto large = settings.cameraFor(box, settings.upFor(box), {320, 200});
         ASSERT_TRUE(large);
         EXPECT_EQ(large->position, whole->position);
         EXPECT_NEAR(std::tan(large->fovY / 2) * 4, std::tan(whole->fovY / 2), 1e-12);
     }
+}
+
+TEST(RenderSettings, TheAxisThatIsAskedForGoesBeforeTheShapeAndThatBeforeTheUsualOne) {
+    const Box ball{{-1, -1, -1}, {1, 1, 1}}, terrain{{0, 0, 0}, {100, 80, 10}}, statue{{0, 0, 0}, {1, 2, 1}};
+    RenderSettings settings;
+    EXPECT_EQ(settings.upFor(ball), UpAxis::Y);
+    EXPECT_EQ(settings.upFor(terrain), UpAxis::Z);
+    settings.usualUp = UpAxis::Z;
+    EXPECT_EQ(settings.upFor(ball), UpAxis::Z);
+    EXPECT_EQ(settings.upFor(statue), UpAxis::Y);
+    settings.up = UpAxis::Y;
+    EXPECT_EQ(settings.upFor(ball), UpAxis::Y);
+    EXPECT_EQ(settings.upFor(terrain), UpAxis::Y);
+    OpenedScene relief;
+    relief.surfaces.bounds = terrain;
+    relief.surfaces.surfaces.emplace_back();
+    settings.up.reset();
+    settings.usualUp = UpAxis::Y;
+    EXPECT_EQ(settings.upFor(relief), UpAxis::Y) << "surfaces lie as they are placed";
 }
 
 TEST(RenderSettings, EachShadingHasItsName) {

@@ -84,4 +84,5 @@ expect 2 "is no folder" "$vcp" serve scan.ply
 ln -s ../mine.html site/outside.html
 mkdir site_twin
 echo secret >site_twin/secret.txt
+"$node" "$here/up_axis_test.mjs" "$source/viewer/web/camera.js" "$source/tests/viewer/camera/up_axis.json"
 "$node" "$here/site_test.mjs" "$vcp" site "$source/viewer/web/ranges.js"

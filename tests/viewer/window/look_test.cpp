@@ -204,6 +204,15 @@ TEST(FileListTest, FoldersFirstThenWhatCanBeOpened) {
     EXPECT_TRUE(list.holding("").empty());
 }
 
+TEST(FileListTest, SeveralWordsAreFoundInAnyOrder) {
+    EXPECT_TRUE(holds("Ctrl+S: save the picture", "picture save"));
+    EXPECT_TRUE(holds("Ctrl+S: save the picture", "  PICT  ctrl+s "));
+    EXPECT_FALSE(holds("Ctrl+S: save the picture", "picture copy"));
+    EXPECT_TRUE(holds("Ctrl+S: save the picture", ""));
+    EXPECT_TRUE(holds("", " "));
+    EXPECT_FALSE(holds("", "a"));
+}
+
 TEST(FileListTest, WhatWasOpenedHasAName) {
     for (const auto& [opened, name] : {std::pair("/scans/a.vcp", "a.vcp"),
                                        {"/scans/b/", "b"},

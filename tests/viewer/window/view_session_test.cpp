@@ -10,6 +10,7 @@
 #include <set>
 #include <thread>
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <glm/geometric.hpp>
 
@@ -115,8 +116,7 @@ TEST_F(RememberingSessionTest, OptionsHoldForOneRun) {
     render.budgetBytes = 64 << 20;
     render.shading.lightFollowsCamera = false;
     render.sections = {*parsePlane("x<50%")};
-    Remembering given =
-        begin({.up = true, .shadows = true, .occlusion = true, .errorPixels = true, .budget = true}, render);
+    Remembering given = begin({.shadows = true, .occlusion = true, .errorPixels = true, .budget = true}, render);
     given.open(ball());
     EXPECT_EQ(given.session->viewer().camera().up, UpAxis::Z);
     EXPECT_TRUE(given.session->viewer().shading().shadows);
@@ -136,13 +136,36 @@ TEST_F(RememberingSessionTest, OptionsHoldForOneRun) {
         EXPECT_EQ(json.find(field), std::string::npos) << field << " in " << json;
 }
 
+TEST_F(RememberingSessionTest, TheAxisChosenByHandIsForScansWhoseShapeDoesNotSay) {
+    std::ofstream(*folder_ / "terrain.obj") << "v 0 0 0\nv 9 0 1\nv 9 9 0\nv 0 9 1\nf 1 2 3\nf 1 3 4\n";
+    BuildOptions build;
+    build.inputs = {*folder_ / "terrain.obj"};
+    build.output = *folder_ / "terrain.vcp";
+    ASSERT_TRUE(buildOctree(build));
+    Remembering first = begin();
+    first.open(build.output);
+    EXPECT_EQ(first.session->viewer().camera().up, UpAxis::Z);
+    first.session->act(ViewerAction::ToggleUpAxis);
+    first.rest();
+    EXPECT_EQ(first.session->viewer().camera().up, UpAxis::Y);
+    first.open(ball());
+    EXPECT_EQ(first.session->viewer().camera().up, UpAxis::Y);
+    EXPECT_FALSE(first.session->changes().up) << "of terrain it says nothing about others";
+    first.session->act(ViewerAction::ToggleUpAxis);
+    end(first);
+
+    Remembering second = begin();
+    second.open(ball());
+    EXPECT_EQ(second.session->viewer().camera().up, UpAxis::Z);
+}
+
 TEST_F(RememberingSessionTest, WhatHandsChangeIsRememberedAlsoAfterOptions) {
     RenderSettings render;
     render.up = UpAxis::Z;
     render.shading.shadows = true;
     render.errorPixels = 7;
     render.budgetBytes = 64 << 20;
-    Remembering first = begin({.up = true, .shadows = true, .errorPixels = true, .budget = true}, render);
+    Remembering first = begin({.shadows = true, .errorPixels = true, .budget = true}, render);
     first.open(ball());
     first.session->act(ViewerAction::ToggleUpAxis);  // to y, which is the default: nothing of it shows below
     first.rest();
@@ -614,6 +637,80 @@ TEST_F(ViewSessionTest, WhatIsOpenedNextCancels) {
     EXPECT_FALSE(session_->saving());
     turn();
     EXPECT_EQ(session_->problem(), "");
+}
+
+TEST_F(ViewSessionTest, OfSeveralFilesThoseThatCannotBeOpenedAreSaid) {
+    const std::string ball = (*folder_ / "ball.vcp").string();
+    std::ofstream("cut.vcp") << contentOf(ball).substr(0, 5000);
+    session_->open({"missing.vcp", ball, "cut.vcp", ball});
+    ASSERT_TRUE(turnUntil([&] { return !session_->opening(); }));
+    EXPECT_EQ(session_->layers().size(), 2u);
+    EXPECT_EQ(session_->viewer().status().name, "ball.vcp and 1 more");
+    EXPECT_EQ(session_->problem(), "missing.vcp: cannot open: No such file or directory (and 1 more not shown)");
+    EXPECT_EQ(session_->user().recent, std::vector<std::string>{ball});
+    session_->saveScene();
+    const auto scene = readScene("scene-1.json");
+    ASSERT_TRUE(scene) << scene.error().line();
+    EXPECT_EQ(scene->datasets.size(), 2u);
+
+    session_->open({"missing.vcp", "cut.vcp"});
+    ASSERT_TRUE(turnUntil([&] { return !session_->opening(); }));
+    EXPECT_EQ(session_->problem(), "missing.vcp: cannot open: No such file or directory");
+    EXPECT_EQ(session_->layers().size(), 2u) << "what is shown stays";
+}
+
+TEST_F(ViewSessionTest, WhatCannotBeOpenedLeavesWhatIsShown) {
+    const std::string ball = contentOf(*folder_ / "ball.vcp");
+    const auto isRefused = [&](const std::string& name, const std::string& content, const std::string& named = {}) {
+        std::ofstream(name, std::ios::binary) << content;
+        session_->open({name});
+        ASSERT_TRUE(turnUntil([&] { return !session_->opening(); }));
+        for (int i = 0; i < 3; ++i) turn();
+        EXPECT_NE(session_->problem().find(named.empty() ? name : named), std::string::npos)
+            << name << ": " << session_->problem();
+        EXPECT_EQ(session_->viewer().status().name, "ball.vcp") << name;
+        EXPECT_TRUE(session_->viewer().status().update.drawable) << name;
+        session_->dismissProblem();
+    };
+    for (const size_t length : {size_t(0), size_t(1), size_t(100), size_t(4096), ball.size() / 2, ball.size() - 1})
+        isRefused(fmt::format("cut-{}.vcp", length), ball.substr(0, length));
+    isRefused("longer.vcp", ball + "0");
+    isRefused("notes.txt", "what I have to do\n");
+    isRefused("cut.ply", contentOf(*folder_ / "ball.ply").substr(0, 3000));
+    isRefused("scene.json", R"({"datasets": [{"file": "missing.vcp"}]})", "missing.vcp");
+    for (size_t at = 0; at < 512; at += 16) {
+        std::string flipped = ball;
+        flipped[at] = char(flipped[at] ^ 0x10);
+        isRefused(fmt::format("flipped-{}.vcp", at), flipped);
+    }
+}
+
+TEST_F(RememberingSessionTest, WhatHasNoRoomLeavesWhatIsShown) {
+    BuildOptions build;
+    build.inputs = {*folder_ / "ball.ply"};
+    build.output = *folder_ / "one-page.vcp";
+    build.cell = 1;
+    ASSERT_TRUE(buildOctree(build));
+    const auto opened = openDataset(ball().string(), {});
+    ASSERT_TRUE(opened);
+    RenderSettings render;
+    render.ramBytes = opened->source->bytesToRead(0, true);
+    Remembering each = begin({}, render);
+    each.open(ball());
+    const auto isDrawable = [&] {
+        for (int i = 0; i < 3000 && !each.session->viewer().status().update.drawable; ++i) {
+            each.turn();
+            std::this_thread::sleep_for(std::chrono::milliseconds(1));
+        }
+        return each.session->viewer().status().update.drawable;
+    };
+    ASSERT_TRUE(isDrawable()) << each.session->problem();
+    each.session->open({ball().string(), build.output.string()});
+    for (int i = 0; i < 10000 && each.session->opening(); ++i) each.turn();
+    EXPECT_NE(each.session->problem().find("allow more"), std::string::npos) << each.session->problem();
+    EXPECT_TRUE(isDrawable()) << "pages of the ball come again";
+    EXPECT_EQ(each.session->viewer().status().name, "ball.vcp");
+    EXPECT_EQ(each.session->layers().size(), 1u);
 }
 
 TEST_F(ViewSessionTest, AFolderThatIsGoneIsSaid) {

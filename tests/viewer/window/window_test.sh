@@ -249,4 +249,13 @@ is_said() { shot said; [ "$(convert said.png -fuzz 10% -fill black +opaque '#ff6
 waits_for "what went wrong is not said" is_said
 ends 1
 grep -q broken.ply log || fail "the error does not name the file"
+# Of several files the others are shown; what leaves nothing to show is said before there is a window.
+"$vcp" build ball.ply -o one.vcp --progress none >/dev/null
+starts one.vcp missing.vcp one.vcp --size 640x480 --samples 1
+waits_for "what is missing is not said" is_said
+waits_for "what is not missing is not shown" is_picture beside_missing
+ends 0
+status=0
+"$vcp" view missing.vcp broken.vcp 2>log || status=$?
+[ $status = 1 ] && [ "$(wc -l <log)" = 1 ] && grep -q '^vcp: missing.vcp: ' log || fail "nothing to show ends with $status"
 echo "window_test: passed, $frames"
