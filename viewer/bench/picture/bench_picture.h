@@ -49,7 +49,7 @@ struct BenchPictureRow {
     double rmse = 0;        ///< of light, 0 to 1
     double flipMean = 0, flipP99 = 0;
     uint64_t isolatedPixels = 0;
-    uint64_t isolatedInMesh = 0;  ///< of the mesh's own picture
+    uint64_t isolatedInMesh = 0;    ///< of the mesh's own picture
     uint64_t silhouettePixels = 0;  ///< covered in one picture and not in the other
     Quantiles silhouetteDistance;   ///< pixels
     Quantiles normalDegrees;        ///< against the mesh's shading normals, averaged over the pixel
