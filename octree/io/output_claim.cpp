@@ -30,6 +30,9 @@ std::string thisMachine() {
     return ::gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "";
 }
 
+/// Whether an error says that the disk is full or failing, so that the output could not be written either.
+bool isOfDisk(int error) { return error == ENOSPC || error == EDQUOT || error == EIO; }
+
 /// Returns what the file says, at most 511 bytes.
 std::string textOf(int file) {
     std::array<char, 511> text{};
@@ -74,7 +77,8 @@ Result<OutputClaim> OutputClaim::take(const fs::path& output) {
     name += ".lock";
     for (;;) {
         made.file_ = FileDescriptor(::open(name.c_str(), O_RDWR | O_CREAT | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC, 0666));
-        const int file = made.file_.number();
+        const int file = made.file_.number(), why = errno;
+        if (!made.file_.isOpen() && isOfDisk(why)) return systemError(name, "cannot be created", why);
         if (!made.file_.isOpen() || !isOurs(file)) return OutputClaim();
         const NameLock lock = lockName(file, name);
         if (lock == NameLock::Gone) continue;

@@ -19,7 +19,7 @@ public:
     /// Claims nothing.
     OutputClaim() = default;
     /// Claims a file, through links, until this is destroyed. What cannot be a new or replaced file is not claimed.
-    /// Errors: Io (another process has claimed it, or another thread: it is named).
+    /// Errors: Io (another process has claimed it, or another thread: it is named; the disk is full or fails).
     static Result<OutputClaim> take(const std::filesystem::path& output);
     ~OutputClaim();
     OutputClaim(OutputClaim&& other) noexcept;
