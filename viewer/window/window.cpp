@@ -165,6 +165,7 @@ public:
                     VCP_TRY_ASSIGN(next, session_->update(seconds()));
                 }
             }
+            showTitle();
             bool isNew = false;
             if (next.draw) {
                 VCP_TRY_ASSIGN(isNew, viewer.draw());
@@ -201,6 +202,12 @@ private:
                     return std::string(text ? text : "");
                 },
                 [this](std::vector<std::string> files) { open(std::move(files)); }, std::move(thumbnails)};
+    }
+
+    /// The window is called what it shows.
+    void showTitle() {
+        const std::string& name = session_->viewer().status().name;
+        if (!name.empty() && name != title_) glfwSetWindowTitle(window_, (title_ = name).c_str());
     }
 
     void open(std::vector<std::string> files) {
@@ -483,6 +490,7 @@ private:
     bool opensPage_ = false;       // the last key did: its character is not typed into the page
     bool isAskedToClose_ = false;  // and the last key was Esc
     glm::dvec3 held_{0};
+    std::string title_;  ///< of the window, once something is shown
     bool mustPresent_ = true, isRescaled_ = false;
     bool darkShown_ = true;
     std::future<std::optional<bool>> desktop_;  ///< what it asks for, while it is asked

@@ -251,7 +251,7 @@ ends 1
 grep -q broken.ply log || fail "the error does not name the file"
 # Of several files the others are shown; what leaves nothing to show is said before there is a window.
 "$vcp" build ball.ply -o one.vcp --progress none >/dev/null
-starts one.vcp missing.vcp one.vcp --size 640x480 --samples 1
+starts '^one.vcp$' missing.vcp one.vcp --size 640x480 --samples 1
 waits_for "what is missing is not said" is_said
 waits_for "what is not missing is not shown" is_picture beside_missing
 ends 0
