@@ -168,12 +168,10 @@ struct CountVisit {
 private:
     /// Returns into how many pieces a page will have a whole triangle cut, at least.
     [[nodiscard]] uint64_t piecesIn(const LatticeTriangle& t, uint32_t level) const {
+        if (level <= lattice) return 1;
         const auto& [a, b, c] = t.corner;
-        const glm::dvec3 edges[3] = {glm::dvec3(a) - glm::dvec3(b), glm::dvec3(b) - glm::dvec3(c),
-                                     glm::dvec3(c) - glm::dvec3(a)};
         const double most = std::ldexp(double(kPartedEdgeCells) * kLatticePerCell, int(lattice) - int(level));
-        const auto isLong = [&](const glm::dvec3& edge) { return glm::dot(edge, edge) > most * most; };
-        return level > lattice && std::ranges::any_of(edges, isLong) ? kLeastPieces : 1;
+        return longestEdge(a, b, c) > most ? kLeastPieces : 1;
     }
 
     // A needle has two long edges.
@@ -374,7 +372,7 @@ Result<FinestPageChoice> choosePages(const PageChoosing& choosing) {
     const auto progress = [&](double part) { return choosing.progress(1 - left + left / 2 * part); };
     for (bool goesOn = true; goesOn; left /= 2) {
         VCP_TRY_ASSIGN(counts, countWhole(choosing, choice.pages, parting.partedLast(), progress));
-        if (left == 1 && choosing.mayBeCoarser) choice.levelsLess = levelsTooMany(counts, triangles);
+        if (parting.partedLast().empty() && choosing.mayBeCoarser) choice.levelsLess = levelsTooMany(counts, triangles);
         if (choice.levelsLess > 0) return choice;
         goesOn = parting.improve(counts);
         choice.pages = parting.pages();

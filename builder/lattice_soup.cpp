@@ -62,7 +62,7 @@ LatticeSnapper::Point LatticeSnapper::pointOf(const Piece& piece, int corner) {
 
 LatticeSnapper::Point LatticeSnapper::middle(const Point& a, const Point& b) const {
     const glm::dvec3 exact = (glm::dvec3(a.at) + glm::dvec3(b.at)) / 2.0;
-    const auto [at, step] = pages_.placeOf(exact, glm::i32vec3(glm::floor(exact)));
+    const auto [at, step] = pages_.vertexOf(exact, glm::i32vec3(glm::floor(exact)));
     return {at,
             (a.moved + b.moved) / 2.0 + (glm::dvec3(at) - exact),
             step,
@@ -165,7 +165,7 @@ LatticeSnapper::Piece LatticeSnapper::snap(const WorldTriangle<Real>& triangle) 
     for (int i = 0; i < 3; ++i) {
         const glm::dvec3 q =
             glm::clamp((glm::dvec3(triangle.corner[i]) - origin_) * scale_, glm::dvec3(0), glm::dvec3(2147483647.0));
-        const auto [at, step] = pages_.placeOf(q, glm::i32vec3(q + 0.5));
+        const auto [at, step] = pages_.vertexOf(q, glm::i32vec3(q + 0.5));
         t.corner[i] = at;
         piece.step[i] = step;
         piece.moved[i] = glm::dvec3(t.corner[i]) - q;

@@ -104,7 +104,7 @@ int FinestPages::stepAt(glm::i32vec3 p) const {
     return 1 << (deepest() - coarsest);
 }
 
-FinestPages::Place FinestPages::placeOf(glm::dvec3 point, glm::i32vec3 at) const {
+FinestPages::Vertex FinestPages::vertexOf(glm::dvec3 point, glm::i32vec3 at) const {
     // Rounding may move it nearer to a page that is coarser still.
     int step = 1;
     for (int here; (here = stepAt(at)) > step; step = here) at = glm::i32vec3(point / double(here) + 0.5) * here;

@@ -56,13 +56,13 @@ public:
     /// Returns the distance between neighbouring vertices around a point, in steps of the deepest level's lattice:
     /// vertices lie on multiples of it.
     [[nodiscard]] int stepAt(glm::i32vec3 p) const;
-    /// A place for a vertex, and the distance to its neighbours there.
-    struct Place {
+    /// Where a vertex lies, and stepAt there.
+    struct Vertex {
         glm::i32vec3 at;
         int step;
     };
-    /// Returns the place for a vertex at a point without negative coordinates; `at`: the point on the deepest lattice.
-    [[nodiscard]] Place placeOf(glm::dvec3 point, glm::i32vec3 at) const;
+    /// Returns the vertex of a point without negative coordinates; `at`: the point on the deepest lattice.
+    [[nodiscard]] Vertex vertexOf(glm::dvec3 point, glm::i32vec3 at) const;
     /// Whether the edge between two points is too long for a page near it.
     [[nodiscard]] bool isTooLong(glm::i32vec3 a, glm::i32vec3 b) const;
 

@@ -1,6 +1,7 @@
 // Builds the octree of a page whose leaves hold the mesh's own triangles: the finest level's.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <span>
 
@@ -17,8 +18,8 @@ inline constexpr size_t kWideLeafTriangles = 4;
 /// No leaf is split where a triangle would be named more often than this: so a page's leaves name at most so many times
 /// its triangles, however they lie.
 inline constexpr double kMostRepetition = 12;
-/// Of a page with more triangles than any that is parted, which they are in heaps only, leaves name no more than this,
-/// or its triangles twice.
+/// The leaves of a page that was not parted though it holds more triangles than a page should (kMostPageTriangles), in
+/// heaps only, name no more than this, or its triangles twice.
 inline constexpr uint64_t kManyRecords = 12 << 17;
 /// Leaves with more triangles than this, which were left so large for that reason, are split all the same, the fullest
 /// first, as long as the whole page keeps to it.
@@ -38,8 +39,7 @@ PageTree buildExactTree(const LatticeMesh& mesh, std::span<const uint32_t> trian
 
 /// Returns how often a page's leaves may name its triangles, in the mean.
 constexpr double mostRepetitionOf(uint64_t triangles) {
-    const double many = double(kManyRecords) / double(triangles > 0 ? triangles : 1);
-    return many < 2 ? 2 : many < kMostRepetition ? many : kMostRepetition;
+    return std::clamp(double(kManyRecords) / double(std::max<uint64_t>(triangles, 1)), 2.0, kMostRepetition);
 }
 
 /// Returns the bytes that a page needs while it is built and coded, measured: of triangles, their vertices (those with

@@ -1,8 +1,8 @@
 // A published page in a headless browser: page_test.mjs chromium|firefox VCP FOLDER PICTURES [images|package|shards|short]
 // FOLDER: as `vcp publish` makes it. PICTURES: folder for what is seen. images: the scan is textured_scene.mjs', without
 // loss, and the folder has it with JPEGs as well, as jpeg.vcp; what concerns images is tested. shards: the scan is in shards,
-// and the folder has it as the one file as well, as whole.vcp. package: the
-// viewer is in node_modules. short: what browsers may do otherwise.
+// and the folder has it as the one file as well, as whole.vcp. package: the viewer is in node_modules. short: what browsers
+// may do otherwise.
 import assert from 'node:assert/strict';
 import { execFileSync, spawn } from 'node:child_process';
 import fs from 'node:fs';

@@ -186,12 +186,14 @@ private:
                 VCP_TRY(report(fmt::format("{}: {}, the mesh", model.files.name, cameras[frame].name)));
                 const LightPicture reference = mesh.draw(request, o_.samples);
                 VCP_TRY(keepPicture(model, cameras[frame], view, "mesh", reference));
+                const size_t isolatedInMesh = isolatedPixels(reference, cameras[frame].camera).size();
                 for (size_t k = 0; k < methods.size(); ++k) {
                     VCP_TRY(report(fmt::format("{}: {}, {} {}", model.files.name, cameras[frame].name,
                                                methods[k]->name(), methods[k]->knob())));
                     VCP_TRY_ASSIGN(const auto drawn, methods[k]->draw(request));
                     BenchPictureRow& row = rows[frame * methods.size() + k];
                     nameRow(row, model, cameras[frame], *methods[k]);
+                    row.isolatedInMesh += isolatedInMesh;
                     judge(row, reference, drawn, cameras[frame].camera, model.cache->dataset().header.cell);
                     VCP_TRY(keepPicture(model, cameras[frame], view,
                                         fmt::format("{} {}", methods[k]->name(), methods[k]->knob()), drawn.picture));
@@ -229,7 +231,6 @@ private:
         row.flipMean += share * sum / double(differences.size());
         row.flipP99 = std::max(row.flipP99, quantile(std::move(differences), 0.99));
         row.isolatedPixels += isolatedPixels(picture, camera).size();
-        row.isolatedInMesh += isolatedPixels(reference, camera).size();
         const SilhouetteDifference silhouette = silhouetteDifference(reference, picture);
         row.silhouettePixels += silhouette.pixels;
         takeWorse(row.silhouetteDistance, silhouette.distancePixels);
