@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstddef>
+#include <vector>
 
 #include <glm/trigonometric.hpp>
 #include <glm/vec4.hpp>
@@ -29,6 +30,21 @@ inline const std::array<float, 256>& lightOfColourBytes() {
     }();
     return table;
 }
+
+/// skyDirection, with what depends on the pixel's place alone found once.
+class SkyDirections {
+public:
+    explicit SkyDirections(const frame::FrameConstants& frame) : spirals_(16 * size_t(frame.occlusionRays)) {
+        for (uint32_t k = 0; k < spirals_.size(); ++k)
+            spirals_[k] = f32::spiralDirection(k / 16, frame.occlusionRays, k % 16, frame.sampleNumber);
+    }
+    [[nodiscard]] glm::vec3 operator()(glm::vec3 normal, uint32_t ray, glm::uvec2 pixel) const {
+        return f32::aboutNormal(normal, spirals_[16 * ray + f32::squareOf(pixel.x, pixel.y)]);
+    }
+
+private:
+    std::vector<glm::vec3> spirals_;  // 16 a ray
+};
 
 /// Returns a light as FrameConstants::lightDirection has it, and its bits of the part of the light that is seen, as the
 /// shaders have them.

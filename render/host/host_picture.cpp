@@ -144,8 +144,7 @@ private:
             size_t count = 0;
             for (uint32_t number = first; number < end; ++number)
                 forEachHit(hits, [&](glm::ivec2 pixel, int i) {
-                    const glm::vec3 direction = f32::skyDirection(surface.normal(i), number, sky, uint32_t(pixel.x),
-                                                                  uint32_t(pixel.y), frame_.sampleNumber);
+                    const glm::vec3 direction = directions_(surface.normal(i), number, pixel);
                     rays[count++] = tiles_.lightRay(origins[i], direction, reach);
                 });
             castLightRays(layer_.scene, {rays, count}, distances, tiles_.lightMarks());
@@ -219,6 +218,7 @@ private:
     const frame::FrameConstants& frame_;
     HostPicture& picture_;
     const LayerTiles tiles_;
+    const SkyDirections directions_{frame_};
     std::optional<SkyPlanes> planes_;
 };
 

@@ -19,8 +19,7 @@ namespace vcp::HWY_NAMESPACE {
 
 void castLightRaysHere(const HostScene& scene, std::span<const LightRay> rays, float* distances, PageMarks* marks) {
     std::array<std::vector<uint32_t>, 8> streams;
-    for (size_t i = 0; i < rays.size(); ++i)
-        streams[SingleRay(rays[i].origin, rays[i].direction).nearest].push_back(uint32_t(i));
+    for (size_t i = 0; i < rays.size(); ++i) streams[SingleRay::nearestOf(rays[i].direction)].push_back(uint32_t(i));
     RayStream stream(scene, marks);
     for (std::vector<uint32_t>& some : streams) {
         if (areParallel(rays, some)) castParallel(scene, rays, some, distances, marks);

@@ -257,9 +257,7 @@ private:
             for (uint32_t n = 0; n < numbers; ++n)
                 for (size_t k = 0; k < tile.count; ++k) {
                     const LitTile::Pixel& from = tile.pixels[k];
-                    directions[n * tile.count + k] =
-                        f32::skyDirection(from.normal, first + n, frame_.occlusionRays, uint32_t(from.pixel.x),
-                                          uint32_t(from.pixel.y), frame_.sampleNumber);
+                    directions[n * tile.count + k] = directions_(from.normal, first + n, from.pixel);
                 }
             std::fill_n(near, numbers * tile.count, reach_);
             for (const auto& each : lit_) castNearer(*each, tile, {directions, numbers * tile.count}, near);
@@ -351,7 +349,8 @@ private:
     const LitLayers lit_;
     LitPlanes planes_;
     const frame::FrameConstants frame_;  // in the world's axes
-    const float reach_;                  // of occlusion, world units
+    const SkyDirections directions_{frame_};
+    const float reach_;  // of occlusion, world units
     std::atomic<uint64_t> unresolvedRays_ = 0, farHits_ = 0;
     bool isMarking_ = false;
 };

@@ -42,7 +42,8 @@ public:
                 continue;
             }
             // Boxes do not overlap and come front to back: the first hit is the nearest.
-            const float distance = leaves_.cast(at, ray_);
+            leaves_.choose(at);
+            const float distance = leaves_.cast(ray_);
             if (distance == kNothing) continue;
             if (marks_ != nullptr) marks_->mark(at.page);
             hit_ = at;

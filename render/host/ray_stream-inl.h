@@ -160,12 +160,13 @@ private:
 
     /// Boxes do not overlap and come front to back: the first hit of a ray is its nearest.
     void visitLeaf(const Visit& at) {
+        leaves_.choose(at.box);
         for (size_t k = at.first; k < at.end; ++k) {
             const PacketPart part = parts_[k];
             RayPacket& packet = packets_[part.packet];
             for (uint32_t rest = part.rays & packet.alive; rest != 0; rest &= rest - 1) {
                 const auto lane = size_t(std::countr_zero(rest)), ray = part.packet * size_t(kLanes) + lane;
-                const float distance = leaves_.cast(at.box, rays_[ray]);
+                const float distance = leaves_.cast(rays_[ray]);
                 if (distance == LeafCaster::kNothing) continue;
                 if (marks_ != nullptr) marks_->mark(at.box.page);
                 if (distance < packet.reach[lane]) found_[ray] = distance;

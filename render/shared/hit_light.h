@@ -54,26 +54,37 @@ const float kTurn = 6.2831853f;
 const float kGoldenTurn = 0.61803399f;
 const float kSilverTurn = 0.41421356f;
 
-// Returns the direction of ray `i` of `count` about the normal, by its cosine (Malley's method on a spiral of the
-// disc). Each pixel of a square of 4 x 4 has its own spiral; shading averages over the square. Each sample of the
-// picture gives a pixel the spiral of another, and moves all spirals between their neighbours.
-INLINE Real3 skyDirection(Real3 n, uint i, uint count, uint x, uint y, uint sampleNumber) {
-    uint square = (((x & 3u) | (y & 3u) << 2) + 5u * sampleNumber) & 15u;
-    uint mixedUp = square * 7u & 15u;
+// Returns the direction of ray `i` of `count` about the z axis, by its cosine (Malley's method on a spiral of the
+// disc). Each pixel of a square of 4 x 4, `square` of 16, has its own spiral; shading averages over the square. Each
+// sample of the picture gives a pixel the spiral of another, and moves all spirals between their neighbours.
+INLINE Real3 spiralDirection(uint i, uint count, uint square, uint sampleNumber) {
+    uint mixed = (square + 5u * sampleNumber) & 15u, mixedUp = mixed * 7u & 15u;
     float wider = fract(0.5f + float(sampleNumber) * kGoldenTurn),
           further = fract(0.5f + float(sampleNumber) * kSilverTurn);
     float radius2 = (float(i) + (float(mixedUp) + wider) / 16.0f) / float(count);
-    float angle = kTurn * fract(float(i) * kGoldenTurn + (float(square) + further) / 16.0f);
-    Real3 side = normalize(abs(n.z) < 0.7f ? Real3(n.y, -n.x, 0.0f) : Real3(0.0f, n.z, -n.y));
+    float angle = kTurn * fract(float(i) * kGoldenTurn + (float(mixed) + further) / 16.0f);
     float r = sqrt(radius2);
-    return r * cos(angle) * side + r * sin(angle) * cross(n, side) + sqrt(1.0f - radius2) * n;
+    return Real3(r * cos(angle), r * sin(angle), sqrt(1.0f - radius2));
+}
+
+// Returns which pixel of its square of 4 x 4 one is.
+INLINE uint squareOf(uint x, uint y) { return (x & 3u) | (y & 3u) << 2; }
+
+// Turns the z axis to the normal.
+INLINE Real3 aboutNormal(Real3 n, Real3 d) {
+    Real3 side = normalize(abs(n.z) < 0.7f ? Real3(n.y, -n.x, 0.0f) : Real3(0.0f, n.z, -n.y));
+    return d.x * side + d.y * cross(n, side) + d.z * n;
+}
+
+// Returns the direction of ray `i` of `count` into the sky over a pixel.
+INLINE Real3 skyDirection(Real3 n, uint i, uint count, uint x, uint y, uint sampleNumber) {
+    return aboutNormal(n, spiralDirection(i, count, squareOf(x, y), sampleNumber));
 }
 
 // Whether a surface that is there in a part of a pixel's samples is left out of this one. Over 16 samples a pixel
 // leaves it out in as many as its opacity says, to a sixteenth; over a square of 4 x 4 pixels so does each sample.
 INLINE bool isFaded(float opacity, uint x, uint y, uint sampleNumber) {
-    uint square = (x & 3u) | (y & 3u) << 2;
-    uint step = (square * 7u + 5u * sampleNumber) & 15u;
+    uint step = (squareOf(x, y) * 7u + 5u * sampleNumber) & 15u;
     return (float(step) + 0.5f) / 16.0f >= opacity;
 }
 

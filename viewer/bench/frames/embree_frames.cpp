@@ -203,9 +203,7 @@ private:
                     valid[k] = origins.isHit[i] ? -1 : 0;
                     any = any || origins.isHit[i];
                     const glm::vec3 direction =
-                        origins.isHit[i] ? f32::skyDirection(surface.normal(i), number, count, uint32_t(pixel.x),
-                                                             uint32_t(pixel.y), frame_.sampleNumber)
-                                         : glm::vec3(0, 0, 1);
+                        origins.isHit[i] ? directions_(surface.normal(i), number, pixel) : glm::vec3(0, 0, 1);
                     setRay(r.ray, k, origins.origin[i], direction, reach_);
                     r.hit.geomID[k] = RTC_INVALID_GEOMETRY_ID, r.hit.instID[0][k] = RTC_INVALID_GEOMETRY_ID;
                 }
@@ -261,6 +259,7 @@ private:
     const std::vector<glm::vec3>& normals_;
     const FrameTask& task_;
     const frame::FrameConstants& frame_;
+    const SkyDirections directions_{frame_};
     HostPicture& picture_;
     const FloatCamera camera_;
     const float reach_;               // of occlusion, world units
