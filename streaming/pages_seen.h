@@ -36,12 +36,14 @@ public:
     /// Takes pages that a frame of an earlier view hit as the guess, in place of the one before, until add() is called.
     void guess(const Dataset& dataset, const std::vector<uint64_t>& pages);
     void dropGuess() { guess_.clear(); }
+    /// Whether a frame of the view was taken in.
+    [[nodiscard]] bool isHeard() const { return isHeard_; }
     /// Approximate bytes of memory that this object takes.
     [[nodiscard]] uint64_t bytesHeld() const;
 
 private:
     std::unordered_set<uint64_t> seen_, guess_;
-    bool isHeard_ = false;  // a frame of this view was
+    bool isHeard_ = false;
 };
 
 }  // namespace vcp

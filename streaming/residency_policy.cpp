@@ -244,10 +244,10 @@ void ResidencyPolicy::see(const PagesHit& hit, const SelectionView& view, ViewNu
     std::vector<uint64_t> pages = hit.byCamera;
     if (hasAll(hit.byCamera, dataset)) pages.insert(pages.end(), hit.byLight.begin(), hit.byLight.end());
     Sight& sight = motions_.at(number).sights[dataset];
-    if (sight.view != view)
-        sight.seen.guess(*tree.dataset, pages);
-    else if (sight.seen.add(*tree.dataset, pages))
-        stale_ = true;
+    if (sight.view != view) return sight.seen.guess(*tree.dataset, pages);
+    // What came until now was a guess, and may have gone for what turned out to be wanted.
+    if (!sight.seen.isHeard()) stillSince_ = round_;
+    if (sight.seen.add(*tree.dataset, pages)) stale_ = true;
 }
 
 bool ResidencyPolicy::hasAll(const std::vector<uint64_t>& pages, size_t dataset) const {
@@ -443,6 +443,7 @@ Placement ResidencyPolicy::place(uint64_t page) {
     changed(page);
     ++counts_.loads;
     counts_.unitsLoaded += units;
+    if (rank != Rank::Wanted) return placement;
     if (loadedIn_[page] == stillSince_ && !emptied_) ++counts_.reloads;
     loadedIn_[page] = stillSince_;
     return placement;

@@ -96,7 +96,8 @@ struct PolicyCounts {
     uint64_t loads = 0, evictions = 0, moves = 0;
     uint64_t unitsLoaded = 0, unitsMoved = 0;
     uint64_t refused = 0;  ///< pages that were read and had no place
-    uint64_t reloads = 0;  ///< pages placed twice while the view stood still: must stay 0
+    /// Pages placed twice for views that stand still, since what their rays hit is no guess: must stay 0.
+    uint64_t reloads = 0;
 };
 
 struct PolicyOutcome {
@@ -251,7 +252,7 @@ private:
     std::optional<std::priority_queue<Evictable>> evictable_;  // made once a page had to go; some may be gone
     SparseArray<uint8_t> resident_;
     SparseArray<uint8_t> states_;     // a PageState for each page
-    SparseArray<uint64_t> loadedIn_;  // for each page, stillSince_ of the still view in which it was last placed
+    SparseArray<uint64_t> loadedIn_;  // for each page, stillSince_ of the still view for which it was last placed
 
     std::map<ViewNumber, Motion> motions_;
     SparseArray<Rank> ranks_;

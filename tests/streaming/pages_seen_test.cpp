@@ -169,7 +169,9 @@ public:
     }
 
     void settle(const SelectionView& view) {
+        const uint64_t reloads = policy.counts().reloads;
         for (int i = 0; !round(view, 1 + random_() % 7); ++i) ASSERT_LT(i, 5000) << "does not settle";
+        EXPECT_EQ(policy.counts().reloads, reloads) << "a still view loaded a page twice";
     }
 
     [[nodiscard]] std::set<uint64_t> resident() const {
