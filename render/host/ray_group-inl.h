@@ -100,9 +100,8 @@ struct GroupSegment {
     HWY_ATTR GroupSegment() {}
 };
 
-/// Returns what section planes, and the spans of rays, leave of a segment.
-inline HWY_NOINLINE GroupSegment cutSegment(const RayGroup& group, const LeafRays& leaf, GroupSegment s) {
-    s.kept.end = Lane(hwy::HighestValue<float>());
+/// Narrows down what is kept of a segment to what section planes leave.
+inline HWY_NOINLINE void cutSegment(const RayGroup& group, const LeafRays& leaf, GroupSegment& s) {
     for (int i = 0; i < leaf.cutCount; ++i) {
         const Lane3 n = spread(glm::vec3(leaf.cuts[i]));
         const Lane along = dot(n, group.direction), off = Lane(leaf.cuts[i].w) - dot(n, s.start), t = off / along;
@@ -111,18 +110,10 @@ inline HWY_NOINLINE GroupSegment cutSegment(const RayGroup& group, const LeafRay
         s.kept.end = select(back, min(s.kept.end, t), s.kept.end);
         s.kept.end = select(without(off > Lane(0.0f), ahead | back), Lane(hwy::LowestValue<float>()), s.kept.end);
     }
-    if (leaf.hasSpans) {
-        const Lane perEdge(1.0f / leaf.edge), from(leaf.distance);
-        s.kept.begin = max(s.kept.begin, (group.begin - from) * perEdge);
-        s.kept.end = min(s.kept.end, (group.end - from) * perEdge);
-    }
-    s.first = max(s.first, s.kept.begin);
-    s.inside = s.inside & (s.first <= min(s.last, s.kept.end));
-    return s;
 }
 
 /// The leaf's box is wider by what its rays are rounded by, so that a ray along a wall is in both leaves beside it.
-/// `kIsCut`: whether section planes cut the leaf.
+/// `kIsCut`: whether section planes cut the leaf, or rays have spans.
 template <bool kIsCut>
 HWY_INLINE GroupSegment segmentIn(const RayGroup& group, const LeafRays& leaf) {
     GroupSegment s;
@@ -136,7 +127,17 @@ HWY_INLINE GroupSegment segmentIn(const RayGroup& group, const LeafRays& leaf) {
     s.first = max(max(min(x0, x1), min(y0, y1)), max(min(z0, z1), s.kept.begin));
     s.last = min(min(max(x0, x1), max(y0, y1)), max(z0, z1));
     s.inside = group.alive & (s.first <= s.last);
-    if constexpr (kIsCut) s = cutSegment(group, leaf, s);
+    if constexpr (kIsCut) {
+        s.kept.end = Lane(hwy::HighestValue<float>());
+        if (leaf.hasSpans) {
+            const Lane perEdge(1.0f / leaf.edge), from(leaf.distance);
+            s.kept.begin = max(s.kept.begin, (group.begin - from) * perEdge);
+            s.kept.end = (group.end - from) * perEdge;
+        }
+        if (leaf.cutCount != 0) cutSegment(group, leaf, s);
+        s.first = max(s.first, s.kept.begin);
+        s.inside = s.inside & (s.first <= min(s.last, s.kept.end));
+    }
     return s;
 }
 
