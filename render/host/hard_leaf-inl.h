@@ -18,7 +18,7 @@ namespace vcp::HWY_NAMESPACE {
 struct GroupInHardLeaf {
     Lane from, first, last;      // where rays enter the leaf; between the others a hit counts
     Lane tau, weightB, weightC;  // the nearest hit so far; `last` is its distance too
-    Lane3 normal;
+    Lane side;                   // 1 where the ray comes from the side of (b - a) x (c - a), else -1
     Mask inside, hit;
     LaneWords triangle;  // what HitLeaf numbers
 
@@ -34,7 +34,7 @@ HWY_INLINE void enterHardLeaf(const RayGroup& group, const LeafRays& leaf, float
     in.last = mulAdd(s.last, cells, slack);
     if (kIsCut) in.last = min(in.last, s.kept.end * cells);
     in.tau = in.weightB = in.weightC = Lane(0.0f);
-    in.normal = Lane3(Lane(0.0f), Lane(0.0f), Lane(0.0f));
+    in.side = Lane(0.0f);
     in.inside = s.inside;
     in.hit = maskOf(0);
     in.triangle = hn::Zero(Words());
@@ -95,14 +95,10 @@ HWY_INLINE Mask castTriangle(const HardLeaf& leaf, const Triangles& t, int i, co
     return taken;
 }
 
-/// Notes of the rays in `taken` that triangle i has stopped them. Its number and normals are known.
+/// Notes of the rays in `taken` that triangle i has stopped them. Its number is known.
 HWY_INLINE void takeTriangle(const Triangles& t, int i, const RayGroup& group, Mask taken, GroupInHardLeaf& in) {
-    const auto normal = [&](int k) HWY_ATTR {
-        return Lane3(Lane(t.normal[k][0][i]), Lane(t.normal[k][1][i]), Lane(t.normal[k][2][i]));
-    };
-    const Lane3 n = mulAdd(in.weightB, normal(1), mulAdd(in.weightC, normal(2), normal(0)));
     const Mask isAway = t.along.at(i, group) > Lane(0.0f);
-    in.normal = select(taken, select(isAway, -n, n), in.normal);
+    in.side = select(taken, select(isAway, Lane(-1.0f), Lane(1.0f)), in.side);
     in.triangle = hn::IfThenElse(hn::RebindMask(Words(), taken), hn::Set(Words(), t.number[i]), in.triangle);
 }
 

@@ -109,6 +109,12 @@ HWY_INLINE Lane2 operator*(Lane2 a, Lane2 b) { return {a.x * b.x, a.y * b.y}; }
 HWY_INLINE Lane2 operator*(Lane a, Lane2 b) { return {a * b.x, a * b.y}; }
 HWY_INLINE Lane2 operator/(Lane2 a, Lane2 b) { return {a.x / b.x, a.y / b.y}; }
 HWY_INLINE Lane2 operator-(Lane2 a, Lane2 b) { return {a.x - b.x, a.y - b.y}; }
+HWY_INLINE Lane3 loadLanes(const float (&numbers)[3][8]) {
+    return {load(numbers[0]), load(numbers[1]), load(numbers[2])};
+}
+HWY_INLINE void storeLanes(Lane3 v, float (&numbers)[3][8]) {
+    store(v.x, numbers[0]), store(v.y, numbers[1]), store(v.z, numbers[2]);
+}
 HWY_INLINE Lane3 operator+(Lane3 a, Lane3 b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
 HWY_INLINE Lane3 operator-(Lane3 a, Lane3 b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
 HWY_INLINE Lane3 operator-(Lane3 a) { return {-a.x, -a.y, -a.z}; }

@@ -23,7 +23,8 @@ struct RayGroup {
     Mask alive;                     // rays of the picture without a hit
     // The hit: its distance in finest cells, multiplied with the direction, and what TileHits keeps.
     Lane t, x, y, z, side;
-    Lane3 normal;
+    Lane3 normal;     // of those that no triangle has stopped
+    Mask onTriangle;  // the others
     LaneWords leaf;
 
     // Compilers for Arm give an implicit constructor no instruction set.
@@ -55,6 +56,7 @@ HWY_INLINE void setNoHit(RayGroup& group) {
     group.t = Lane(hwy::HighestValue<float>());
     group.x = group.y = group.z = group.side = Lane(0.0f);
     group.normal = Lane3(Lane(0.0f), Lane(0.0f), Lane(0.0f));
+    group.onTriangle = maskOf(0);
     group.leaf = hn::Zero(Words());
 }
 

@@ -53,13 +53,6 @@ struct MetTriangles : TriangleVertices {
     alignas(32) float steep[8];                 // the least |normal . d| at which planes are met clearly
 };
 
-HWY_INLINE Lane3 loadLanes(const float (&numbers)[3][8]) {
-    return {load(numbers[0]), load(numbers[1]), load(numbers[2])};
-}
-HWY_INLINE void storeLanes(Lane3 v, float (&numbers)[3][8]) {
-    store(v.x, numbers[0]), store(v.y, numbers[1]), store(v.z, numbers[2]);
-}
-
 /// Finds what is kept of triangles whose vertices are known.
 HWY_INLINE void setUpTriangles(MetTriangles& t) {
     const Lane3 p[3] = {vertexOf(t, 0), vertexOf(t, 1), vertexOf(t, 2)};

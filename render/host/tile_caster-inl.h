@@ -66,16 +66,21 @@ private:
     /// Notes that triangle t has stopped the rays in `taken`.
     HWY_INLINE void keepTriangle(const WalkEntry& at, Triangles& triangles, int t, const RayGroup& group, Mask taken,
                                  GroupInHardLeaf& in) {
-        if (!triangles.haveNormals) setUpNormals(*scene_.page(at.page).view, triangles);
         if (triangles.number[t] == Triangles::kNoNumber) {
             triangles.number[t] = nextLeaf();
             const auto& corners = triangles.corners;
-            hits_.leaves.push_back({at.page, at.word, {corners[0][t], corners[1][t], corners[2][t]}, {}, 0});
+            const auto& flat = triangles.flat;
+            hits_.leaves.push_back({.page = at.page,
+                                    .node = at.word,
+                                    .corners = {corners[0][t], corners[1][t], corners[2][t]},
+                                    .flat = {flat[0][t], flat[1][t], flat[2][t]}});
+            isOnTriangles_ = true;
         }
         takeTriangle(triangles, t, group, taken, in);
     }
 
     void writeHits() {
+        if (isOnTriangles_) normals_.find(scene_, hits_.leaves);
         // The edge of a cell in two parts, so that depths are rounded once.
         const Lane cell{float(scene_.grid().cell)}, rest{scene_.grid().cell - double(float(scene_.grid().cell))};
         for (int i = 0; i < kGroups; ++i) {
@@ -88,11 +93,18 @@ private:
             writeRows(group.y, hits_.y + at);
             writeRows(group.z, hits_.z + at);
             writeRows(group.side, hits_.side + at);
-            writeRows(group.normal.x, hits_.normalX + at);
-            writeRows(group.normal.y, hits_.normalY + at);
-            writeRows(group.normal.z, hits_.normalZ + at);
+            const Lane3 normal = normalOf(group);
+            writeRows(normal.x, hits_.normalX + at);
+            writeRows(normal.y, hits_.normalY + at);
+            writeRows(normal.z, hits_.normalZ + at);
             writeRows(Lane(hn::BitCast(Floats(), group.leaf)), reinterpret_cast<float*>(hits_.leaf) + at);
         }
+    }
+
+    [[nodiscard]] HWY_INLINE Lane3 normalOf(const RayGroup& group) const {
+        if (!any(group.onTriangle)) return group.normal;
+        const LaneWords numbers = hn::IfThenElseZero(hn::RebindMask(Words(), group.onTriangle), group.leaf);
+        return select(group.onTriangle, group.side * normals_.at(numbers, group.x, group.y), group.normal);
     }
 
     /// Returns by how much a group's directions are longer than the tile's middle one, which has unit length.
@@ -113,6 +125,8 @@ private:
     }
 
     TileHits& hits_;
+    TriangleNormals normals_;
+    bool isOnTriangles_ = false;  // some hits are
 };
 
 }  // namespace vcp::HWY_NAMESPACE

@@ -23,9 +23,10 @@ inline constexpr int kTileWidth = 16, kTileHeight = 8, kTilePixels = kTileWidth 
 struct HitLeaf {
     uint32_t page;         ///< of the scene (HostScene::page)
     uint32_t node;         ///< the leaf's node word
-    Index3 corners = {};   ///< the triangle's vertices in the page; of hard leaves only
+    Index3 corners = {};   ///< the triangle's vertices a, b and c in the page; of hard leaves only
+    glm::vec3 flat{0};     ///< (b - a) x (c - a); likewise
     glm::uvec3 corner{0};  ///< the leaf's lowest corner, subcells; of soft and slab leaves only
-    uint32_t bits = 0;     ///< log2 of the leaf's edge in subcells; likewise
+    uint32_t bits = 0;     ///< log2 of the leaf's edge in subcells; of these, too
 };
 
 /// The first hits of a tile's rays. Element y * kTileWidth + x of an array belongs to pixel corner + (x, y); those
@@ -39,7 +40,8 @@ struct TileHits {
     /// The hit in leaf space where a soft or slab leaf is hit; else the weights of the triangle's second and third
     /// vertex, and 0.
     alignas(32) float x[kTilePixels], y[kTilePixels], z[kTilePixels];
-    /// A number with the sign of the side that the ray came from (sideBefore in shared/leaf_math.h); soft leaves only.
+    /// A number with the sign of the side that the ray came from: of soft leaves that of sideBefore
+    /// (shared/leaf_math.h), of triangles 1 for that of (b - a) x (c - a).
     alignas(32) float side[kTilePixels];
     /// The surface's normal: of any length, on the side that the ray comes from, or near a silhouette leaning away a
     /// bit.

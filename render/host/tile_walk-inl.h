@@ -190,7 +190,8 @@ private:
         group.t = select(in.hit, max(mulAdd(in.tau, Lane(cell), Lane(leaf.distance)), Lane(0.0f)), group.t);
         group.x = select(in.hit, in.weightB, group.x);
         group.y = select(in.hit, in.weightC, group.y);
-        group.normal = select(in.hit, in.normal, group.normal);
+        group.side = select(in.hit, in.side, group.side);
+        group.onTriangle = group.onTriangle | in.hit;
         finish(i, in.hit, in.triangle);
     }
 

@@ -10,6 +10,8 @@
 #endif
 
 #include <algorithm>
+#include <span>
+#include <vector>
 
 #include "octree/surface/leaf_math.h"
 #include "render/host/ray_group-inl.h"
@@ -74,15 +76,13 @@ struct TriangleVertices {
 struct Triangles : TriangleVertices {
     static constexpr uint32_t kNoNumber = ~0u;
 
-    uint32_t number[8];  // of the triangle's HitLeaf, once a ray has hit
+    uint32_t number[8];  // as of TriangleNormals, once a ray has hit
     LinearSums volume[3], along, height;
     alignas(32) float slack[3][8];   // a ray misses where a volume is below that, which is less than 0
     alignas(32) float lowest[3][8];  // all rays of a group miss where their middle's volume is below that
     alignas(32) float reach[8];      // by so much `along` differs in a group from its middle's
     alignas(32) float steep[8];      // the least |along| that is clear
-    bool haveNormals;                // normals are found when a ray hits
-    // Vertex a's normal, then the differences of b's and c's from it; all on the side of (b - a) x (c - a).
-    alignas(32) float normal[3][3][8];
+    alignas(32) float flat[3][8];    // (b - a) x (c - a)
 };
 
 HWY_INLINE LaneWords field21(LaneWords word) { return hn::And(word, hn::Set(Words(), kField21Mask)); }
@@ -144,7 +144,7 @@ HWY_INLINE void setUpTriangles(const PageView& view, const HardLeaf& leaf, Trian
     store(Lane(1.001f) * reachInGroup(perX, perY, leaf.halfGroup), t.reach);
     t.height.set(dot(n, p[0] - leaf.start), -dot(n, leaf.startPerX), -dot(n, leaf.startPerY));
     store(Lane(kSteep) * length[1] * length[2], t.steep);
-    t.haveNormals = false;
+    storeLanes(n, t.flat);
     std::fill_n(t.number, kLanes, Triangles::kNoNumber);
 }
 
@@ -155,29 +155,61 @@ HWY_INLINE Lane3 decodeNormals(LaneWords code) {
                             mulAdd(toFloats(hn::ShiftRight<16>(code)), Lane(2.0f / 65535.0f), below), Lane(1.0f));
 }
 
-/// Finds the normals that are blended over triangles: those of the vertices, and at a crease the triangle's own.
-inline HWY_NOINLINE void setUpNormals(const PageView& view, Triangles& t) {
-    const Lane3 a = vertexOf(t, 0);
-    Lane3 flat = cross(vertexOf(t, 1) - a, vertexOf(t, 2) - a);
-    flat = (Lane(1.0f) / sqrt(max(dot(flat, flat), Lane(1e-30f)))) * flat;
-    Lane3 first = flat;
-    for (int k = 0; k < 3; ++k) {
-        const LaneWords code = gather(view.normals.data(), hn::Load(Words(), t.corners[k]));
-        const LaneWords bit = hn::Set(Words(), kNormalCreaseBit);
-        const Mask isCrease = hn::RebindMask(Floats(), hn::Eq(hn::And(code, bit), bit));
-        const Lane3 smooth = decodeNormals(code);
-        const Lane3 turned = select(dot(smooth, flat) < Lane(0.0f), -smooth, smooth);
-        Lane3 normal = select(isCrease, flat, turned);
-        if (k == 0)
-            first = normal;
-        else
-            normal = normal - first;
-        store(normal.x, t.normal[k][0]);
-        store(normal.y, t.normal[k][1]);
-        store(normal.z, t.normal[k][2]);
-    }
-    t.haveNormals = true;
+/// Returns the normals that are blended from vertices: their own, on the side of the triangle's, `flat`, or at a crease
+/// that.
+HWY_INLINE Lane3 vertexNormals(LaneWords code, Lane3 flat) {
+    const LaneWords bit = hn::Set(Words(), kNormalCreaseBit);
+    const Mask isCrease = hn::RebindMask(Floats(), hn::Eq(hn::And(code, bit), bit));
+    const Lane3 smooth = decodeNormals(code);
+    return select(isCrease, flat, select(dot(smooth, flat) < Lane(0.0f), -smooth, smooth));
 }
+
+/// Normals of the triangles that rays of a tile hit, which are numbered as TileHits::leaves are.
+class TriangleNormals {
+public:
+    /// Finds the normals at the vertices of all.
+    HWY_NOINLINE void find(const HostScene& scene, std::span<const HitLeaf> leaves) {
+        room_ = (leaves.size() + kLanes - 1) / kLanes * kLanes;
+        normals_.resize(9 * room_);
+        for (size_t first = 0; first < room_; first += kLanes) {
+            alignas(32) uint32_t codes[3][8] = {};
+            alignas(32) float flats[3][8] = {};
+            for (size_t i = first; i < std::min(first + kLanes, leaves.size()); ++i) {
+                if (nodeType(leaves[i].node) != kNodeHard) continue;
+                const std::span<const uint32_t> normals = scene.page(leaves[i].page).view->normals;
+                for (size_t k = 0; k < 3; ++k) {
+                    codes[k][i - first] = normals[leaves[i].corners[k]];
+                    flats[k][i - first] = leaves[i].flat[int(k)];
+                }
+            }
+            Lane3 flat = loadLanes(flats), normals[3];
+            flat = (Lane(1.0f) / sqrt(max(dot(flat, flat), Lane(1e-30f)))) * flat;
+            for (size_t k = 0; k < 3; ++k) normals[k] = vertexNormals(hn::Load(Words(), codes[k]), flat);
+            const Lane3 kept[3] = {normals[0], normals[1] - normals[0], normals[2] - normals[0]};
+            for (size_t k = 0; k < 3; ++k) {
+                float* to = &normals_[3 * k * room_ + first];
+                hn::StoreU(kept[k].x.v, Floats(), to);
+                hn::StoreU(kept[k].y.v, Floats(), to + room_);
+                hn::StoreU(kept[k].z.v, Floats(), to + 2 * room_);
+            }
+        }
+    }
+
+    /// Returns the normals at points of triangles, on the side of `flat`. `b`, `c`: the weights of the vertices.
+    [[nodiscard]] HWY_INLINE Lane3 at(LaneWords numbers, Lane b, Lane c) const {
+        const auto kept = [&](size_t k) HWY_ATTR {
+            const float* from = &normals_[3 * k * room_];
+            return Lane3(gatherFloats(from, numbers), gatherFloats(from + room_, numbers),
+                         gatherFloats(from + 2 * room_, numbers));
+        };
+        return mulAdd(b, kept(1), mulAdd(c, kept(2), kept(0)));
+    }
+
+private:
+    size_t room_ = 0;
+    // Of vertex a, then the differences of b's and c's from it: x, y and z, room_ numbers each.
+    std::vector<float> normals_;
+};
 
 /// Returns which triangles a ray of a group may meet: bit i is triangle i.
 HWY_INLINE uint32_t trianglesMet(const Triangles& t, const RayGroup& group) {
