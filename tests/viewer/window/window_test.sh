@@ -257,7 +257,7 @@ waits_for "what is not missing is not shown" is_picture beside_missing
 # What is typed replaces the number that a new annotation is called by.
 key n
 xdotool mousemove --window $window 320 240 click 1 sleep 0.5
-key S e a m Return
+key S e a m Return Return
 xdotool mousemove --window $window 5 100
 ends 0
 grep -q '"Seam"' "$XDG_CONFIG_HOME/vcp/view.json" || fail "the title of an annotation is not what was typed"
