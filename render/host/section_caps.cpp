@@ -1,6 +1,7 @@
 // castCaps, compiled for several instruction sets, as castTile is (tile_caster.cpp).
 #include "render/host/section_caps.h"
 
+#include <cmath>
 #include <optional>
 
 #include <glm/geometric.hpp>
@@ -19,7 +20,8 @@ namespace vcp::HWY_NAMESPACE {
 
 // These are as in trace.comp, which says what they are for.
 constexpr int kMostCrossings = 64;
-constexpr float kPastHit = 0.15f, kOneSheetCosine = 0.6f, kOneSheetCells = 0.6f;
+constexpr float kPastHit = 0.15f, kPastTriangle = 4e-4f, kRounding = 0x1p-21f;
+constexpr float kOneSheetCosine = 0.6f, kOneSheetCells = 0.6f;
 constexpr double kLinePixels = 1, kLeastCosine = 1e-3;
 
 /// Counts the walls that rays cross.
@@ -27,7 +29,10 @@ class WallCounter {
 public:
     /// `ofClosed`: open parts have no walls.
     WallCounter(const HostScene& scene, bool ofClosed, PageMarks* marks)
-        : scene_(scene), ofClosed_(ofClosed), caster_(scene, marks) {}
+        : scene_(scene),
+          ofClosed_(ofClosed),
+          rounding_(kRounding * std::ldexp(1.0f, int(scene.rootBits() - kMaxSubcellDepth))),
+          caster_(scene, marks) {}
 
     /// Returns a wall behind a point where the point is inside of the solid: an odd number of walls lies behind. Two of
     /// three rays decide, for one may graze a wall. `direction`: unit.
@@ -77,9 +82,10 @@ private:
             const WalkEntry& leaf = caster_.hitLeaf();
             const HostScene::Page& page = scene_.page(leaf.page);
             const auto cell = float(1u << page.cellBits);
+            const float past = nodeType(leaf.word) == kNodeHard ? kPastTriangle * cell + rounding_ : kPastHit * cell;
             if (ofClosed_ && kindsOfHit() == kPageHasOpen) {
-                gap += distance - from + kPastHit * cell;
-                from = distance + kPastHit * cell;
+                gap += distance - from + past;
+                from = distance + past;
                 continue;
             }
             if (!first) first = leaf;
@@ -89,7 +95,7 @@ private:
                 std::abs(glm::dot(direction, before)) * (gap + distance - from) < kOneSheetCells * cell;
             count += isSameSheet ? 0 : 1;
             before = normal;
-            gap = kPastHit * cell;
+            gap = past;
             from = distance + gap;
         }
         return count;
@@ -102,6 +108,7 @@ private:
 
     const HostScene& scene_;
     bool ofClosed_;
+    float rounding_;  // of distances along a ray in the scene; finest cells
     RayCaster caster_;
 };
 

@@ -23,6 +23,10 @@ layout(local_size_x = 8, local_size_y = 8) in;
 const uint kMostCrossings = 64u;
 // A ray goes on so far past a hit, in cells of its page: more than leaf walls bridge, less than the thinnest parts.
 const float kPastHit = 0.15;
+// Triangles bridge nothing, and large ones may be the two sides of a thin plate: past a hit with one a ray goes on by
+// twice what triangles are widened by, either way, and by what rounding may move the hit, in edges of the root.
+const float kPastTriangle = 4e-4;
+const float kRounding = 4.76837158e-7;  // 2^-21
 
 // Slabs whose normals are this near to each other, as a cosine, and of which the second begins so near to the first
 // one's plane, in cells, are of one sheet: a ray may cross several where the sheet passes from cell to cell.
@@ -35,6 +39,12 @@ struct Wall {
     float gap;    // how far the ray has come since; finest cells
 };
 
+// Returns how far a ray goes on past a hit; finest cells. `cell`: edge of a cell of the hit's page.
+float wayPast(Hit hit, float cell) {
+    float root = powerOfTwo(int(frame.finestLevel + frame.log2Cells));
+    return nodeType(hit.leaf) == kNodeHard ? kPastTriangle * cell + kRounding * root : kPastHit * cell;
+}
+
 // Returns whether a hit is not of the same sheet as the wall before it, and makes it the wall before the next.
 bool isNewWall(Hit hit, float cell, vec3 direction, inout Wall before) {
     vec3 normal = vec3(0.0);
@@ -45,7 +55,7 @@ bool isNewWall(Hit hit, float cell, vec3 direction, inout Wall before) {
     }
     bool isSame = abs(dot(normal, before.normal)) > kOneSheetCosine &&
                   abs(dot(direction, before.normal)) * (before.gap + hit.depth) < kOneSheetCells * cell;
-    before = Wall(normal, kPastHit * cell);
+    before = Wall(normal, wayPast(hit, cell));
     return !isSame;
 }
 
@@ -110,10 +120,10 @@ bool takeWall(inout InsideTest test, Hit wall, Ray eyeRay) {
     bool open = wall.depth < kNoHit;
     float cell = powerOfTwo(int(frame.finestLevel) + wall.pageBits - int(kLatticeBits));
     if (hasParts(wall, kRecordIsOpen))
-        test.before.gap += wall.depth + kPastHit * cell;
+        test.before.gap += wall.depth + wayPast(wall, cell);
     else
         test.crossings += open && isNewWall(wall, cell, test.ray.direction, test.before) ? 1u : 0u;
-    test.ray = movedAlong(test.ray, open ? wall.depth + kPastHit * cell : 0.0);
+    test.ray = movedAlong(test.ray, open ? wall.depth + wayPast(wall, cell) : 0.0);
     test.walls++;
     if (open && test.walls < kMostCrossings) return true;
     test.inside += test.crossings & 1u;

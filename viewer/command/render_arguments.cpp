@@ -83,7 +83,8 @@ void addCameraSettings(CLI::App& app, RenderSettings& settings) {
         "a view, a camera file, or an azimuth and an elevation below 90 degrees, like 30,35, and a magnification, "
         "like 30,35,2",
         "Where from: " + viewNames() +
-            ", a camera file (JSON), or azimuth and elevation in degrees and a magnification: 30,35 or 30,35,2")
+            ", a camera file (JSON), or azimuth (from x on, as seen from above) and elevation in degrees and a "
+            "magnification: 30,35 or 30,35,2")
         ->type_name("VIEW|FILE")
         ->default_str("fit");
     addUp(app, settings.up);
@@ -94,10 +95,11 @@ void addRenderSettings(CLI::App& app, RenderSettings& settings) {
     const ScopedGroup scope(app, help_group::kLook);
     addLight(app, settings);
     addEnvironment(app, settings.environment);
-    addParsed(
-        app, "--shading", settings.shading.mode, shadingNamed, fmt::format("one of {}", fmt::join(kShadingNames, ", ")),
-        "lit or unlit (with colour where there is any), clay, normals; false colours: level (of detail), error (up "
-        "to a pixel), steps, cells, fetches (work of each ray)")
+    addParsed(app, "--shading", settings.shading.mode, shadingNamed,
+              fmt::format("one of {}", fmt::join(kShadingNames, ", ")),
+              "lit or unlit (with colour where there is any), clay, normals, wireframe (edges of triangles and "
+              "leaves); false "
+              "colours: level (of detail), error (up to a pixel), steps, cells, fetches (work of each ray)")
         ->type_name(fmt::format("MODE:{{{}}}", fmt::join(kShadingNames, ",")))
         ->default_str("lit");
     app.add_flag("!--plain", settings.shading.channels,
@@ -121,6 +123,7 @@ void addRenderSettings(CLI::App& app, RenderSettings& settings) {
     app.add_flag("--caps{closed}", settings.caps,
                  "Fill what sections cut open of closed parts, and draw the rest as lines; --caps=all: fill as if all "
                  "were closed")
+        ->type_name("[=all]")
         ->transform(CLI::Transformer(std::map<std::string, Caps>{{"closed", Caps::Closed}, {"all", Caps::All}})
                         .description("{closed,all}"));
     beginGroup(app, help_group::kLimits);

@@ -11,15 +11,11 @@ namespace vcp {
 
 Result<InputKind> kindOf(const std::vector<std::string>& inputs) {
     const auto isDataset = [](const std::string& input) { return isHttpUrl(input) || looksLikeDataset(input); };
-    const auto datasets = size_t(std::count_if(inputs.begin(), inputs.end(), isDataset));
     const auto scenes = size_t(std::count_if(inputs.begin(), inputs.end(), isSceneName));
     if (scenes > 0 && inputs.size() > 1)
         return Error{.code = ErrorCode::Usage, .message = "a scene file (.json) is opened alone"};
     if (scenes > 0) return InputKind::Scene;
-    if (datasets > 0 && datasets < inputs.size())
-        return Error{.code = ErrorCode::Usage,
-                     .message = "several inputs must all be meshes or all .vcp files; a scene file (.json) takes both"};
-    return datasets > 0 ? InputKind::Datasets : InputKind::Meshes;
+    return std::any_of(inputs.begin(), inputs.end(), isDataset) ? InputKind::Datasets : InputKind::Meshes;
 }
 
 Result<std::filesystem::path> datasetFor(const std::vector<std::string>& inputs, BuildOptions build) {

@@ -10,9 +10,10 @@
 
 namespace vcp {
 
-/// One scene file (.json), .vcp files and addresses, or meshes.
+/// One scene file (.json); .vcp files and addresses, and meshes beside them, each of which is a dataset of its own; or
+/// meshes alone, which are joined to one dataset.
 enum class InputKind { Scene, Datasets, Meshes };
-/// Returns the kind of the inputs. Errors: Usage (kinds are mixed; several scenes).
+/// Returns the kind of the inputs. Errors: Usage (a scene is not alone).
 Result<InputKind> kindOf(const std::vector<std::string>& inputs);
 
 /// Returns the .vcp to show for `inputs`: the input itself when it is one, else the mesh built into the default cache.

@@ -194,7 +194,8 @@ Result<OpenedScene> SceneOpening::take() { return *std::exchange(opened_, std::n
 Result<OpenedScene> SceneOpening::open() {
     // The display goes with the work: it is taken away before an error is shown.
     BuildOptions build = std::exchange(build_, {});
-    if (!inputs_.empty() && !isSceneName(inputs_.front())) build.sample = sample_;
+    const auto kind = kindOf(inputs_);
+    if (kind && *kind == InputKind::Meshes) build.sample = sample_;
     build.progress = [this, told = std::move(build.progress)](const BuildProgress& at) {
         const bool goesOn = !told || told(at);
         const std::lock_guard lock(mutex_);

@@ -280,7 +280,7 @@ bool sectionHead(const Look& look, const char* icon, const char* label, bool isO
     return isOpen;
 }
 
-void typedField(const Look& look, const char* icon, const std::string& typed, const char* hint) {
+void typedField(const Look& look, const char* icon, const std::string& typed, bool isMarked, const char* hint) {
     const ImVec2 from = ImGui::GetCursorScreenPos();
     const float width = ImGui::GetContentRegionAvail().x, height = look.units(32);
     ImDrawList& list = *ImGui::GetWindowDrawList();
@@ -290,8 +290,10 @@ void typedField(const Look& look, const char* icon, const std::string& typed, co
     const float top = from.y + 0.5f * (height - look.body->FontSize), left = from.x + look.units(36);
     textIn(list, look.body, {from.x + look.units(10), top}, look.palette.dim, icon);
     const std::string shown = fittedEnd(typed, width - look.units(48));
-    textIn(list, look.body, {left, top}, typed.empty() ? look.palette.dim : look.palette.ink,
-           typed.empty() ? hint : shown);
+    if (isMarked)
+        list.AddRectFilled({left, top}, {left + widthOf(shown), top + look.body->FontSize}, look.palette.accent);
+    const ImU32 ink = isMarked ? look.palette.onAccent : look.palette.ink;
+    textIn(list, look.body, {left, top}, typed.empty() ? look.palette.dim : ink, typed.empty() ? hint : shown);
     const float caret = left + (typed.empty() ? -look.units(2) : widthOf(shown) + look.units(1));
     list.AddLine({caret, top}, {caret, top + look.body->FontSize}, look.palette.accent, look.units(1));
     ImGui::Dummy({width, height});

@@ -58,7 +58,7 @@ void caption(const Look& look, const char* label);
 void progressBar(const Look& look, double part);
 /// The head of a section, which opens and closes it. Returns whether it is open.
 bool sectionHead(const Look& look, const char* icon, const char* label, bool isOpenAtFirst);
-/// A field that shows typed text behind an icon, with a caret; a hint where there is none.
-void typedField(const Look& look, const char* icon, const std::string& typed, const char* hint);
+/// A field that shows typed text behind an icon, with a caret, or marked; a hint where there is none.
+void typedField(const Look& look, const char* icon, const std::string& typed, bool isMarked, const char* hint);
 
 }  // namespace vcp

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
+#include <utility>
 
 #include <fmt/format.h>
 #include <imgui.h>
@@ -51,7 +52,10 @@ void Interface::layOut(glm::ivec2 framebuffer, const Look& look) {
     layOutToasts();
     if (page_ == Page::Help) layOutHelp();
     if (page_ == Page::Files) layOutFiles();
-    if (const auto made = session_->takeNewPoint()) openPoint(*made);
+    if (const auto made = session_->takeNewPoint()) {
+        openPoint(*made);
+        markTyped();  // its name is a number
+    }
     if (page_ == Page::Point) layOutPoint();
     ImGui::PopFont();
 }
@@ -224,7 +228,9 @@ std::string Interface::stateText() const {
     if (status.drawnPart < 1) return fmt::format("Drawing, {:.0f} %", 5 * std::floor(20 * status.drawnPart));
     switch (status.detail) {
         case Detail::Loading:
-            return update.pagesMissing > 0 ? fmt::format("Loading, {} parts to come", update.pagesMissing) : "Loading";
+            return update.pagesMissing > 0
+                       ? fmt::format("Loading, {} to come", formatCount(update.pagesMissing, "part"))
+                       : "Loading";
         case Detail::Settled:
             return update.drawable ? "Sharp" : "Ready";
         case Detail::Finest:
@@ -373,10 +379,21 @@ void Interface::type(uint32_t codepoint) {
     const int bytes = codepoint < 0x80 ? 1 : codepoint < 0x800 ? 2 : 3;
     utf8[0] = char(bytes == 1 ? codepoint : bytes == 2 ? 0xc0 | codepoint >> 6 : 0xe0 | codepoint >> 12);
     for (int i = 1; i < bytes; ++i) utf8[i] = char(0x80 | (codepoint >> (6 * (bytes - 1 - i)) & 0x3f));
+    if (std::exchange(isTypedMarked_, false)) typed_.clear();
     typed_.append(utf8, size_t(bytes));
 }
 
+void Interface::pasteTyped() {
+    std::string pasted = host_.pasteText();
+    std::ranges::replace_if(
+        pasted, [](char c) { return uint8_t(c) < 0x20 || c == 0x7f; }, ' ');
+    if (pasted.empty()) return;
+    if (std::exchange(isTypedMarked_, false)) typed_.clear();
+    typed_ += pasted;
+}
+
 void Interface::eraseTyped() {
+    if (std::exchange(isTypedMarked_, false)) return typed_.clear();
     while (!typed_.empty() && (uint8_t(typed_.back()) & 0xc0) == 0x80) typed_.pop_back();
     if (!typed_.empty()) typed_.pop_back();
 }

@@ -41,9 +41,13 @@ public:
     void openFileList();
     [[nodiscard]] bool takesText() const { return page_ != Page::None; }
     /// Closes the page. Precondition: takesText().
-    void closePage() { page_ = Page::None; }
+    void closePage() { page_ = Page::None, isTypedMarked_ = false; }
     void type(uint32_t codepoint);
     void eraseTyped();
+    /// Types what was copied, as one line.
+    void pasteTyped();
+    /// Marks all that is typed: what is typed next replaces it.
+    void markTyped() { isTypedMarked_ = !typed_.empty(); }
     /// Opens what is first in the file list; of an annotation, goes on from the title to the text, and ends there.
     void enterTyped();
     /// Opens a page to write what an annotation says.
@@ -149,6 +153,7 @@ private:
     float toolbarHeight_ = 0, statusHeight_ = 0, panelWidth_ = 0;
     Page page_ = Page::None;
     std::string typed_;
+    bool isTypedMarked_ = false;
     size_t point_ = 0;         // that is written
     bool writesText_ = false;  // and not its title
     FileList files_;

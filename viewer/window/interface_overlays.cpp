@@ -92,6 +92,9 @@ void Interface::drawAnnotations() const {
     const ImVec2 mouse = ImGui::GetIO().MousePos;
     const auto under = annotationAt(session_->points(), annotatedView(), {mouse.x, mouse.y});
     if (!under || session_->points()[*under].text.empty()) return;
+    // Below the title, or above it where the picture ends.
+    const bool isLow = mouse.y > 0.75f * ImGui::GetIO().DisplaySize.y;
+    ImGui::SetNextWindowPos({mouse.x, mouse.y + units(isLow ? -24 : 24)}, 0, {0, isLow ? 1.0f : 0.0f});
     ImGui::BeginTooltip();
     ImGui::PushTextWrapPos(units(320));
     text(session_->points()[*under].text);

@@ -66,7 +66,7 @@ void Interface::layOutPage(const char* title, const char* hint, float width, flo
     text(look_->strong, look_->palette.ink, title);
     ImGui::SetCursorPos({right - units(24), top});
     if (iconButton(*look_, icon::kClose, "close", {"Close", "Esc"}, false, 24)) closePage();
-    typedField(*look_, page_ == Page::Point ? icon::kEdit : icon::kSearch, typed_, hint);
+    typedField(*look_, page_ == Page::Point ? icon::kEdit : icon::kSearch, typed_, isTypedMarked_, hint);
     ImGui::BeginChild("rest", {0, 0});
     (this->*layOutRest)();
     ImGui::EndChild();
@@ -78,10 +78,13 @@ void Interface::layOutKeys() {
     const bool isWide = width >= units(kTwoColumns);
     const float column = isWide ? (width - units(32)) / 2 : width;
     const auto isShown = [&](const KeyHelp& each) { return holds(fmt::format("{} {}", each.keys, each.does), typed_); };
+    const auto keys = keyMap();
+    const auto isGroupShown = [&](KeyGroup group) {
+        return std::ranges::any_of(keys, [&](const KeyHelp& each) { return each.group == group && isShown(each); });
+    };
     const auto layOutGroup = [&](KeyGroup group) {
-        const auto keys = keyMap();
         const auto belongs = [&](const KeyHelp& each) { return each.group == group && isShown(each); };
-        if (std::none_of(keys.begin(), keys.end(), belongs)) return;
+        if (!isGroupShown(group)) return;
         text(look_->strong, look_->palette.accent, nameOf(group));
         const float left = ImGui::GetCursorPosX();
         const float keysWide = std::min(units(kKeysWidth), 0.4f * column);
@@ -109,12 +112,11 @@ void Interface::layOutKeys() {
     static constexpr KeyGroup kRight[] = {KeyGroup::Look, KeyGroup::Measure, KeyGroup::Save};
     const float from = ImGui::GetCursorPosX();
     layOutColumn(kLeft);
-    if (isWide) {
+    if (isWide && std::ranges::any_of(kLeft, isGroupShown)) {
         ImGui::SameLine();
         ImGui::SetCursorPosX(from + column + units(32));
     }
     layOutColumn(kRight);
-    const auto keys = keyMap();
     if (std::none_of(keys.begin(), keys.end(), isShown)) text(look_->body, look_->palette.dim, "No key does that");
 }
 
@@ -191,6 +193,7 @@ void Interface::layOutPointRest() {
     int part = writesText_ ? 1 : 0;
     if (choiceRow(*look_, "part", kParts, part, {"What is written", "Enter"})) {
         writesText_ = part == 1;
+        isTypedMarked_ = false;
         typed_ = writesText_ ? session_->points()[point_].text : session_->points()[point_].title;
     }
     const float half = (ImGui::GetContentRegionAvail().x - units(8)) / 2;
@@ -203,6 +206,7 @@ void Interface::layOutPointRest() {
 }
 
 void Interface::enterTyped() {
+    isTypedMarked_ = false;
     if (page_ == Page::Point && !writesText_) {
         writesText_ = true;
         typed_ = session_->points()[point_].text;

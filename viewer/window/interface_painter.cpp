@@ -80,7 +80,7 @@ Result<void> InterfacePainter::setOptions(const Options& options) {
 /// Fills the fonts' texture: letters, icons, and the pictures.
 void InterfacePainter::makeFonts() {
     // Ranges of characters; Dear ImGui reads them when it makes the texture.
-    static constexpr ImWchar kAll[] = {0x20, 0x17f, 0x2009, 0x2265, 0, 0};
+    static constexpr ImWchar kAll[] = {0x20, 0x17f, 0x370, 0x52f, 0x2009, 0x2265, 0};
     static constexpr ImWchar kWestern[] = {0x20, 0xff, 0x2009, 0x2265, 0, 0};
     static constexpr ImWchar kIconRange[] = {0xf000, 0xf700, 0};
     ImFontAtlas& atlas = *ImGui::GetIO().Fonts;
@@ -104,7 +104,7 @@ void InterfacePainter::makeFonts() {
     };
     look_.body = withIcons(add(kInterRegular, kBodyHeight, kAll, 0, false), kIconHeight);
     look_.strong = withIcons(add(kInterSemibold, kBodyHeight, kAll, 0, false), kIconHeight);
-    look_.small = add(kInterRegular, kSmallHeight, kWestern, 0, false);
+    look_.small = add(kInterRegular, kSmallHeight, kAll, 0, false);
     look_.title = withIcons(add(kInterSemibold, kTitleHeight, kWestern, 0, false), kTitleIconHeight);
     std::vector<int> places;
     for (const Picture& picture : pictures_)

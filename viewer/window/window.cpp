@@ -47,7 +47,8 @@ public:
         if (started_) glfwTerminate();
     }
 
-    Result<void> open(glm::ivec2 size, const std::string& title) {
+    /// `asked`: the window's size, where it was asked for; else it is `usual`, or less where the screen is smaller.
+    Result<void> open(std::optional<glm::ivec2> asked, glm::ivec2 usual, const std::string& title) {
         if (!glfwInit()) return displayError("no display to open a window on");
         started_ = true;
         VCP_TRY(openVulkanLibrary());
@@ -57,6 +58,7 @@ public:
         // The name of the entry in the desktop's menu.
         glfwWindowHintString(GLFW_X11_CLASS_NAME, "vcp");
         glfwWindowHintString(GLFW_X11_INSTANCE_NAME, "vcp");
+        const glm::ivec2 size = asked ? *asked : onScreen(usual);
         window_ = glfwCreateWindow(size.x, size.y, title.c_str(), nullptr, nullptr);
         if (!window_) return displayError("the window cannot be opened");
         return {};
@@ -92,6 +94,16 @@ public:
     }
 
 private:
+    static glm::ivec2 onScreen(glm::ivec2 size) {
+        GLFWmonitor* monitor = glfwGetPrimaryMonitor();
+        if (!monitor) return size;
+        glm::ivec2 corner(0), room(0);
+        glm::vec2 scale(1);
+        glfwGetMonitorWorkarea(monitor, &corner.x, &corner.y, &room.x, &room.y);
+        glfwGetMonitorContentScale(monitor, &scale.x, &scale.y);
+        return fittingSize(size, room, scale);
+    }
+
     bool started_ = false;
     GLFWwindow* window_ = nullptr;
 };
@@ -358,7 +370,10 @@ private:
         if (key == GLFW_KEY_F1) interface_.toggleHelp();
         if (key == GLFW_KEY_BACKSPACE) interface_.eraseTyped();
         if (key == GLFW_KEY_ENTER || key == GLFW_KEY_TAB) interface_.enterTyped();
-        if (key == GLFW_KEY_Q && (mods & GLFW_MOD_CONTROL) != 0) glfwSetWindowShouldClose(window_, GLFW_TRUE);
+        if ((mods & GLFW_MOD_CONTROL) == 0) return;
+        if (key == GLFW_KEY_A) interface_.markTyped();
+        if (key == GLFW_KEY_V) interface_.pasteTyped();
+        if (key == GLFW_KEY_Q) glfwSetWindowShouldClose(window_, GLFW_TRUE);
     }
 
     void controlKey(int key) {
@@ -502,8 +517,7 @@ Result<WindowReport> showWindow(const WindowOptions& options) {
     const auto start = std::chrono::steady_clock::now();
     const std::vector<std::string>& inputs = options.session.inputs;
     WindowSystem system;
-    VCP_TRY(
-        system.open(options.size.value_or(options.session.user.windowSize), inputs.empty() ? "vcp" : nameOf(inputs)));
+    VCP_TRY(system.open(options.size, options.session.user.windowSize, inputs.empty() ? "vcp" : nameOf(inputs)));
     std::future<std::optional<bool>> desktop = std::async(std::launch::async, askDesktop);
     VCP_TRY_ASSIGN(auto session, ViewSession::create(options.session, system.surfaceSource()));
     if (isReady(desktop, kThemeAwaited)) session->followDesktop(desktop.get());

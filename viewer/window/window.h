@@ -43,6 +43,12 @@ inline glm::ivec2 unscaledSize(glm::ivec2 window, glm::ivec2 framebuffer, glm::d
     return glm::ivec2(glm::round(glm::dvec2(window) / scale));
 }
 
+/// Returns a window's size in the same units that fits on a screen with room for `room` pixels, where there are some.
+inline glm::ivec2 fittingSize(glm::ivec2 size, glm::ivec2 room, glm::dvec2 scale) {
+    if (!(room.x > 0 && room.y > 0 && scale.x > 0 && scale.y > 0)) return size;
+    return glm::min(size, glm::ivec2(glm::dvec2(room) / scale));
+}
+
 /// Opens the window at once, the inputs in it as soon as they are built, and returns when it is closed. Main thread
 /// only, one at a time (GLFW). Errors: Device (no display, no Vulkan for it, and what the renderer says).
 Result<WindowReport> showWindow(const WindowOptions& options);

@@ -248,6 +248,47 @@ TEST_P(HostSectionsOfOpen, AnOpenSurfaceIsALine) {
 
 INSTANTIATE_TEST_SUITE_P(All, HostSectionsOfOpen, testing::Values(kBallBeside, kBallInside));
 
+// A machine's part of few triangles: plates that are thinner than a hundredth of a cell, and one within another. What
+// is filled is what is in an odd number of them.
+TEST_F(HostSections, PlatesThinnerThanACell) {
+    const std::vector<std::array<glm::dvec3, 2>> boxes{{glm::dvec3(0, 0, 0), glm::dvec3(100, 2, 60)},
+                                                       {glm::dvec3(10, 4, 10), glm::dvec3(40, 24, 40)},
+                                                       {glm::dvec3(12, 6, 12), glm::dvec3(38, 22, 38)},
+                                                       {glm::dvec3(60, 3, 10), glm::dvec3(80, 23, 10.5)}};
+    IndexedMesh mesh;
+    for (const auto& box : boxes) test::append(mesh, test::boxMesh(box[0], box[1], 1));
+    const test::BuiltMesh built(mesh, 60);
+    ASSERT_TRUE(built.ok());
+    open(built);
+    const glm::dvec3 low(0, 0, 0), high(100, 24, 60), normal = glm::normalize(glm::dvec3(-1, -1.1, -1.2));
+    FrameRequest request = requestOf(fitCamera(low, high, {-0.5, -0.4, -0.7}, {0, 1, 0}, 0.6, 4.0 / 3));
+    request.sections = {{normal, glm::dot(normal, glm::dvec3(70, 10, 10.3))}};
+    request.sectionCaps = Caps::Closed;
+    const Difference d = difference(request, built.cache().dataset().header.cell);
+    EXPECT_LE(d.state + d.depth + d.normal + d.colour, 3u);
+    const Planes drawn = drawnBy(*host_, request);
+    const double error = 2 * built.report().certifiedErrorMax;  // and about as much that triangles are widened by
+    uint64_t filled = 0;
+    for (uint32_t y = 0; y < request.height; ++y)
+        for (uint32_t x = 0; x < request.width; ++x) {
+            const CameraRay ray = cameraRay(request.camera, request.width, request.height, x + 0.5, y + 0.5);
+            const double t =
+                (request.sections[0].offset - glm::dot(normal, ray.origin)) / glm::dot(normal, ray.direction);
+            const glm::dvec3 at = ray.origin + t * ray.direction;
+            const auto filledBy = [&](double margin) {
+                return std::ranges::count_if(boxes, [&](const auto& box) {
+                    return glm::all(glm::lessThan(box[0] - margin, at)) && glm::all(glm::lessThan(at, box[1] + margin));
+                });
+            };
+            const bool isFilled = filledBy(0) % 2 == 1;
+            if (filledBy(-error) != filledBy(error)) continue;
+            const float depth = drawn.depth[size_t{y} * request.width + x];
+            filled += isFilled ? 1 : 0;
+            EXPECT_EQ(std::abs(depth - t) < 1e-5 * t, isFilled) << x << " " << y;
+        }
+    EXPECT_GT(filled, 500u);
+}
+
 // A ball cut open: each pixel of the disc is cap, and none about it; without caps, its far wall is seen.
 TEST_F(HostSections, ABallHasADisc) {
     const Scene scene = test::sphereScene(1);

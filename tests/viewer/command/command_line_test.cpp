@@ -900,7 +900,14 @@ TEST_F(CommandLine, ScenesOfSeveralDatasets) {
     render("twice.png", {dataset().string(), dataset().string()});
     EXPECT_EQ(readPng(*folder_ / "one.png").value(), readPng(*folder_ / "twice.png").value())
         << "two in one place look like one";
-    const fs::path scene = *folder_ / "scene.json";
+    const fs::path scene = *folder_ / "scene.json", beside = *folder_ / "beside.off";
+    // A mesh beside a dataset is one of its own.
+    write(beside, "OFF\n4 4 6\n2 0 0\n3 0 0\n2 1 0\n2 0 1\n3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n");
+    write(scene, Json{{"datasets", {{{"file", dataset().string()}}, {{"file", beside.string()}}}}}.dump());
+    render("both.png", {dataset().string(), beside.string()});
+    render("both_in_scene.png", {scene.string()});
+    EXPECT_EQ(readPng(*folder_ / "both.png").value(), readPng(*folder_ / "both_in_scene.png").value());
+    EXPECT_NE(readPng(*folder_ / "both.png").value(), readPng(*folder_ / "one.png").value());
     // A small one before the large one, a mesh, and one beside; the camera is the scene's.
     write(scene, Json{{"datasets",
                        {{{"file", dataset().filename().string()}},

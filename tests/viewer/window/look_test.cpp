@@ -154,7 +154,8 @@ TEST(Typeset, NumbersKeepTheirUnitsAndDigitsTogether) {
     EXPECT_EQ(typeset("3 parts, 4 per second"), "3 parts, 4 per second");
 }
 
-/// The fonts as the build embeds them have every icon of the list, and the signs that typeset() makes.
+/// The fonts as the build embeds them have every icon of the list, the signs that typeset() makes, and Greek and
+/// Cyrillic.
 TEST(Fonts, HaveWhatIsDrawn) {
     const std::string folder = std::string(VCP_SOURCE_DIR) + "/viewer/annotation/fonts/";
     const auto fontOf = [&](ImFontAtlas& atlas, const char* file) {
@@ -174,7 +175,8 @@ TEST(Fonts, HaveWhatIsDrawn) {
         ImFontAtlas atlas;
         const ImFont* const font = fontOf(atlas, file);
         ASSERT_TRUE(font && atlas.Build());
-        for (const int sign : {0x202f, 0x2070, 0x2079, 0x207b, 0x2212, 0xb1, 0xd7, 0x2026, 0xb0, 0xe4, 0x17f})
+        for (const int sign : {0x202f, 0x2070, 0x2079, 0x207b, 0x2212, 0xb1, 0xd7, 0x2026, 0xb0, 0xe4, 0x17f, 0x3a9,
+                               0x3ce, 0x416, 0x451})
             EXPECT_NE(font->FindGlyphNoFallback(ImWchar(sign)), nullptr) << file << ' ' << std::hex << sign;
         for (ImWchar digit = '0'; digit <= '9'; ++digit)
             EXPECT_NEAR(font->GetCharAdvance(digit), font->GetCharAdvance('0'), 0.02) << "figures are tabular";

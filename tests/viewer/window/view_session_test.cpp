@@ -381,6 +381,13 @@ TEST(Window, ASizeIsRememberedAsItIsMadeFrom) {
         << "in units that are scaled already";
 }
 
+TEST(WindowSize, FitsOnTheScreen) {
+    EXPECT_EQ(fittingSize({1280, 800}, {3840, 2160}, {1, 1}), glm::ivec2(1280, 800));
+    EXPECT_EQ(fittingSize({1280, 800}, {3840, 2160}, {3, 3}), glm::ivec2(1280, 720));
+    EXPECT_EQ(fittingSize({1280, 800}, {1024, 600}, {1, 1}), glm::ivec2(1024, 600));
+    EXPECT_EQ(fittingSize({1280, 800}, {0, 0}, {1, 1}), glm::ivec2(1280, 800)) << "the screen says nothing";
+}
+
 TEST_F(ViewSessionTest, ATurntableIsAFolderOfPictures) {
     session_->savePicture(kSmall);
     ASSERT_TRUE(isSaved());

@@ -254,7 +254,13 @@ grep -q broken.ply log || fail "the error does not name the file"
 starts '^one.vcp$' missing.vcp one.vcp --size 640x480 --samples 1
 waits_for "what is missing is not said" is_said
 waits_for "what is not missing is not shown" is_picture beside_missing
+# What is typed replaces the number that a new annotation is called by.
+key n
+xdotool mousemove --window $window 320 240 click 1 sleep 0.5
+key S e a m Return Return
+xdotool mousemove --window $window 5 100
 ends 0
+grep -q '"Seam"' "$XDG_CONFIG_HOME/vcp/view.json" || fail "the title of an annotation is not what was typed"
 status=0
 "$vcp" view missing.vcp broken.vcp 2>log || status=$?
 [ $status = 1 ] && [ "$(wc -l <log)" = 1 ] && grep -q '^vcp: missing.vcp: ' log || fail "nothing to show ends with $status"

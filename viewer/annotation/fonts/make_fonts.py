@@ -4,8 +4,8 @@
     apt-get install fonts-inter fonts-materialdesignicons-webfont python3-fonttools
     ./make_fonts.py
 
-Writes inter_regular.otf, inter_semibold.otf and icons.ttf beside itself, the same bytes each time. Inter keeps Latin
-letters, digits and the signs that the window's texts use. Dear ImGui knows no OpenType features: so that columns of
+Writes inter_regular.otf, inter_semibold.otf and icons.ttf beside itself, the same bytes each time. Inter keeps Latin,
+Greek and Cyrillic letters, digits and the signs that the window's texts use. Dear ImGui knows no OpenType features: so that columns of
 numbers stand still, digits and the signs around them become their tabular forms here. viewer/window/icons.h lists
 the icons; a test compares the two.
 """
@@ -20,10 +20,11 @@ HERE = pathlib.Path(__file__).resolve().parent
 INTER = pathlib.Path("/usr/share/fonts/opentype/inter")
 ICONS = pathlib.Path("/usr/share/fonts/truetype/materialdesignicons-webfont/materialdesignicons-webfont.ttf")
 
-# Latin with its accents; dashes, quotes, dots, thin spaces and raised figures; signs of units and keys.
+# Latin with its accents; dashes, quotes, dots, thin spaces and raised figures; signs of units and keys; Greek and
+# Cyrillic.
 TEXT = [*range(0x20, 0x7F), *range(0xA0, 0x180), *range(0x2009, 0x200B), 0x202F, *range(0x2010, 0x2016),
         *range(0x2018, 0x201F), 0x2022, 0x2026, 0x2032, 0x2033, 0x2070, *range(0x2074, 0x207A), 0x207B,
-        *range(0x2190, 0x2194), 0x2212, 0x2248, 0x2264, 0x2265, 0x21E7, 0x0394, 0x03B1, 0x03BC]
+        *range(0x2190, 0x2194), 0x2212, 0x2248, 0x2264, 0x2265, 0x21E7, *range(0x0370, 0x0530)]
 
 
 def tabular(font):

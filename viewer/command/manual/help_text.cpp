@@ -52,16 +52,18 @@ public:
         if (option->get_type_size() == 0) return {};
         const std::string type = option->get_type_name();
         std::string text = type.empty() ? "" : " " + type.substr(0, type.find(':'));
+        if (text.starts_with(" [=")) return text.substr(1);  // what a flag may have behind its name
         if (!text.empty() && option->get_items_expected_min() == 0) return fmt::format(" [{}]", text.substr(1));
         if (option->get_expected_max() == CLI::detail::expected_max_vector_size) text += "...";
         if (!option->get_default_str().empty()) text += fmt::format(" [{}]", option->get_default_str());
         return option->get_required() && option->nonpositional() ? text + " (required)" : text;
     }
 
-    /// Returns "--settle,--no-settle".
+    /// Returns "--settle,--no-settle": the names without the values in braces that they stand for.
     std::string make_option_name(const CLI::Option* option, bool isPositional) const override {
-        const std::string name = CLI::Formatter::make_option_name(option, isPositional);
-        return CLI::detail::find_and_replace(name, "{false}", "");
+        std::string name = CLI::Formatter::make_option_name(option, isPositional);
+        for (size_t at = 0; (at = name.find('{')) != std::string::npos;) name.erase(at, name.find('}', at) + 1 - at);
+        return name;
     }
 
     std::string make_option_desc(const CLI::Option* option) const override {
