@@ -27,7 +27,6 @@ constexpr double kRefineFrames = 3;
 
 constexpr double kStepPollSeconds = 0.004;
 
-constexpr int kLargestReduction = 8;
 constexpr double kZoomPerNotch = 0.85;
 constexpr double kSectionPerNotch = 0.01;  // part of the bounding box's diagonal
 constexpr double kFarthestSection = 4;     // the most that a drag moves a plane, in diagonals
@@ -109,7 +108,8 @@ Viewer::Viewer(const ViewerOptions& options, std::unique_ptr<Renderer> renderer)
       renderer_(std::move(renderer)),
       shading_(options.shading),
       sections_(options.sections),
-      sectionCaps_(options.sectionCaps) {
+      sectionCaps_(options.sectionCaps),
+      movingSize_(options.movingFrameMs) {
     status_.device = renderer_->device().name;
     status_.software = renderer_->device().software;
     status_.budgetBytes = options.renderer.budgetBytes;
@@ -481,13 +481,10 @@ void Viewer::act(ViewerAction action) {
 
 bool Viewer::isMoving(double now) const { return now - movedAt_ < kRestSeconds; }
 
-int Viewer::reductionAt(double now) const {
-    if (options_.movingFrameMs <= 0 || !isMoving(now)) return 1;
+int Viewer::reductionAt(double now) {
+    if (!isMoving(now)) movingSize_.rest();
     // A view that holds still for a moment is not drawn again, coarser, because its picture took long.
-    if (now > movedAt_ || fullFrameMs_ <= options_.movingFrameMs) return movingReduction_;
-    const int wanted =
-        int(std::min<double>(std::ceil(std::sqrt(fullFrameMs_ / options_.movingFrameMs)), kLargestReduction));
-    return std::max(wanted, movingReduction_);
+    return isMoving(now) ? movingSize_.next(now <= movedAt_) : 1;
 }
 
 void Viewer::advanceMotion(double now) {
@@ -551,7 +548,7 @@ Result<NextStep> Viewer::update(double now) {
     if (!hasSize()) return NextStep{};
     if (drawn_ && (!sameView(camera_, seen_) || (sectionDrag_ && sections_ != request_.sections))) movedAt_ = now;
     seen_ = camera_;
-    requestReduction_ = movingReduction_ = reductionAt(now);
+    requestReduction_ = reductionAt(now);
     request_ = requestWith(requestReduction_);
     status_.drawnPart = renderer_->finishedPart();
     // Pages are taken in when the picture is finished: it is of those that were there when it was begun.
@@ -665,7 +662,8 @@ void Viewer::takeStats(const DoneFrame& done) {
     const bool hasOcclusion = done.request.shading.occlusionRays > 0;
     if (done.number == 1 || (hasOcclusion && done.stats.onHost)) return;
     const double light = hasOcclusion ? done.stats.msLight : 0;
-    fullFrameMs_ = double(size_.x) * size_.y / double(done.stats.rays) * (done.stats.msFrame - light);
+    const double fullMs = double(size_.x) * size_.y / double(done.stats.rays) * (done.stats.msFrame - light);
+    movingSize_.take(std::max(1, int(std::lround(double(size_.x) / done.request.width))), fullMs);
 }
 
 }  // namespace vcp

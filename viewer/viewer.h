@@ -33,6 +33,7 @@
 #include "octree/io/result.h"
 #include "render/view/renderer.h"
 #include "viewer/camera/orbit_camera.h"
+#include "viewer/moving_size.h"
 #include "viewer/scene/meso_scene.h"
 #include "viewer/section_handle.h"
 #include "viewer/surface_motion.h"
@@ -260,7 +261,7 @@ private:
     Viewer(const ViewerOptions& options, std::unique_ptr<Renderer> renderer);
     [[nodiscard]] bool hasSize() const { return size_.x > 0 && size_.y > 0; }
     [[nodiscard]] bool isMoving(double now) const;
-    [[nodiscard]] int reductionAt(double now) const;
+    int reductionAt(double now);
     [[nodiscard]] FrameRequest requestWith(int reduction) const;
     [[nodiscard]] bool refinementIsDue(double now) const;
     [[nodiscard]] NextStep nextStep(double now);
@@ -323,8 +324,7 @@ private:
     double movedAt_ = -std::numeric_limits<double>::infinity();
     double drawnAt_ = -std::numeric_limits<double>::infinity();
     double now_ = 0;
-    double fullFrameMs_ = 0;
-    int movingReduction_ = 1;  // grows within a motion, never shrinks: a size that flickers is worse than a small one
+    MovingSize movingSize_;
     bool pagesChanged_ = false;
     bool hasSettled_ = false;              // since a scene was opened
     bool addsSample_ = false;              // the next draw does

@@ -1,0 +1,44 @@
+// How large pictures are while the camera moves: as large as a frame's time allows.
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+namespace vcp {
+
+/// Decides from frame to frame by how much the width and the height of moving pictures are reduced. A slow frame by
+/// itself changes nothing; pictures become smaller where three in a row were too slow, and larger where many in a row
+/// left room. Where that was in vain, the next attempt waits twice as long: sizes must not flicker.
+class MovingSize {
+public:
+    static constexpr int kMost = 8;
+
+    /// `frameMs`: what a frame may take; 0: pictures are never reduced.
+    explicit MovingSize(double frameMs) : frameMs_(frameMs) {}
+
+    /// Takes in a frame whose width and height were divided by `reduction`. `fullMs`: what it would have taken at full
+    /// size, if time were in proportion to pixels. It is less: so this is too much for all larger pictures.
+    void take(int reduction, double fullMs);
+    /// The camera rests: the next motion begins with what a frame at full size took.
+    void rest();
+    /// Returns the reduction of the next moving picture, 1 to kMost. `isNew`: the camera has moved on since the last
+    /// one; else its size stays.
+    int next(bool isNew);
+
+private:
+    static constexpr size_t kRemembered = 3;
+    static constexpr int kPatience = 6;
+    static constexpr double kRoom = 0.7;  // of the time, that a larger picture may take
+
+    [[nodiscard]] int reductionFor(double fullMs, double frameMs) const;
+
+    double frameMs_;
+    std::array<double, kRemembered> fullMs_{};  // of the last frames
+    size_t frames_ = 0;
+    int reduction_ = 1;
+    int calm_ = 0;              // frames in a row that left room
+    int patience_ = kPatience;  // so many make pictures larger
+    bool hasTried_ = false;     // pictures were made larger last
+};
+
+}  // namespace vcp
