@@ -207,11 +207,14 @@ private:
         if (done_.stage != "read") return {};
         files_.soup = std::make_unique<Soup>(space_, memory_.bufferBytes);
         VCP_TRY(files_.reopen(done_, space_));
-        return reactivate();
+        return reactivate(kReadingShare);
     }
 
-    /// Continues the journal in the same file; what it says stays true.
-    Result<void> reactivate() { return journal_.record(space_.folder(), {{"resumed", true}}); }
+    /// Continues the journal in the same file; what it says stays true. `done`: fraction of the whole.
+    Result<void> reactivate(double done) {
+        meter_.beginAt(done);
+        return journal_.record(space_.folder(), {{"resumed", true}});
+    }
 
     Result<void> resumeBins() {
         levelsLess_ = done_.levelsLess;
@@ -232,7 +235,7 @@ private:
             return Error{.code = ErrorCode::InvalidInput,
                          .message = "names a bin that there is not; build again from the start",
                          .file = (space_.folder().path() / kJournalName).string()};
-        return reactivate();
+        return reactivate(pass_ < 0 ? 1 - kWritingShare : fractionAt(firstBin_));
     }
 
     // Reading and dealing
@@ -440,6 +443,24 @@ private:
         return (parents.size() + kSlabPagesPerBin - 1) / kSlabPagesPerBin;
     }
 
+    /// Returns the fraction of the whole that is done where the pass comes to a bin.
+    [[nodiscard]] double fractionAt(size_t bin) {
+        double before = 0, all = 0;
+        if (plan_.isOfSlabs(pass_)) {
+            before = double(bin * kSlabPagesPerBin);
+            all = double(siblingsBelow().size());
+        } else {
+            before = double(trianglesBefore(bin));
+            all = double(files_.current->raw().total());
+        }
+        return passBegins(pass_) + (passEnds(pass_) - passBegins(pass_)) * before / std::max(all, 1.0);
+    }
+    [[nodiscard]] uint64_t trianglesBefore(size_t bin) const {
+        uint64_t triangles = 0;
+        for (size_t each = 0; each < bin; ++each) triangles += files_.current->count(each);
+        return triangles;
+    }
+
     /// Returns the pages below the pass's, which hold the mesh or have been made from those that do, by their parents.
     std::vector<Siblings> siblingsBelow() {
         PageSpool& below = files_.surfaces[size_t(pass_) + 1];
@@ -496,17 +517,15 @@ private:
         };
         const double begins = passBegins(pass_), ends = passEnds(pass_);
         const uint64_t total = std::max<uint64_t>(files_.current->raw().total(), 1);
-        uint64_t done = 0;
-        for (size_t bin = 0; bin < partition.bins(); ++bin) {
+        uint64_t done = trianglesBefore(firstBin_);
+        for (size_t bin = firstBin_; bin < partition.bins(); ++bin) {
             const uint64_t count = files_.current->count(bin);
             const auto at = [&](double part) {
                 return begins + (ends - begins) * (double(done) + part * double(count)) / double(total);
             };
-            if (bin >= firstBin_) {
-                VCP_TRY(runBin(bin, partition.first()[bin], LevelPlan::endOf(partition, bin, level), handOn, at));
-                releaseMemory();
-                if (bin + 1 < partition.bins()) VCP_TRY(checkpoint("levels", bin + 1));
-            }
+            VCP_TRY(runBin(bin, partition.first()[bin], LevelPlan::endOf(partition, bin, level), handOn, at));
+            releaseMemory();
+            if (bin + 1 < partition.bins()) VCP_TRY(checkpoint("levels", bin + 1));
             done += count;
         }
         return endPass();
