@@ -10,8 +10,6 @@
 #endif
 
 #include <fmt/format.h>
-#include <oneapi/tbb/global_control.h>
-#include <oneapi/tbb/task_arena.h>
 
 #include "builder/bin_passes.h"
 #include "builder/checkpoint.h"
@@ -27,6 +25,7 @@
 #include "builder/progress_meter.h"
 #include "builder/slab_pages.h"
 #include "builder/spill/journal.h"
+#include "builder/work_arena.h"
 #include "octree/io/output_claim.h"
 #include "octree/io/output_file.h"
 
@@ -50,11 +49,7 @@ public:
           memory_(plan),
           meter_(options.progress),
           space_(tempFolder, plan.tempBytes),
-          arena_(int(threads)) {
-        // Without this TBB gives no more threads than processors, and warns about it.
-        if (threads > tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism))
-            more_.emplace(tbb::global_control::max_allowed_parallelism, threads);
-    }
+          arena_(threads) {}
 
     Result<BuildReport> run() {
         auto built = caught([this] { return stages(); });
@@ -654,8 +649,7 @@ private:
     bool isResumed_ = false, partitionRecorded_ = false;
     double lastCheckpoint_ = 0;                ///< seconds
     double imagesShare_ = 0, imagesDone_ = 0;  ///< of the whole time
-    std::optional<tbb::global_control> more_;
-    tbb::task_arena arena_;
+    WorkArena arena_;
 
     SoupMeasures measures_;
     LevelPlan plan_;
