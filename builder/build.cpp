@@ -622,11 +622,15 @@ private:
     Result<void> write() {
         VCP_TRY(joinParts());
         FileHeader header = headerOf(plan_, measures_, hasColour(), meshParts_->counts);
-        VCP_TRY_ASSIGN(report_.fileBytes,
-                       assembleDataset(files_.spools, header, options_.output, rules(),
-                                       files_.images.empty() ? nullptr : &files_.images.front(), [this](double part) {
-                                           return progress("writing", 1 - kWritingShare + kWritingShare * part);
-                                       }));
+        std::vector<JoinedSpools> levels(files_.spools.size());
+        for (size_t i = 0; i < levels.size(); ++i) levels[i].add(files_.spools[i]);
+        const PageSpool* const images = files_.images.empty() ? nullptr : &files_.images.front();
+        const auto report = [this](double part) {
+            return progress("writing", 1 - kWritingShare + kWritingShare * part);
+        };
+        VCP_TRY_ASSIGN(report_.fileBytes, arena_.execute([&] {
+            return assembleDataset(levels, header, options_.output, rules(), images, report);
+        }));
         describe(header, report_);
         report_.cutTriangles = measures_.cutTriangles;
         progress("done", 1);
