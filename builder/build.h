@@ -46,6 +46,7 @@ enum class VertexNormals { Mesh, Computed };
 struct BuildProgress {
     std::string stage = {};  ///< "reading", "images", "sorting", "level 5 of 6", "writing", "done"
     double fraction = 0;     ///< fraction of the whole build, 0 to 1, never decreasing; 1: done
+    double begun = 0;        ///< the fraction that was done when this run began; 0 unless it was resumed
     uint64_t triangles = 0;  ///< read so far
     uint64_t tempBytes = 0;  ///< on the temporary disk now
     double seconds = 0;

@@ -78,8 +78,7 @@ private:
     bool areWhole_ = true;
 };
 
-SoupMeasures measuresFrom(Fields& all) {
-    Fields from(all.object("measures"));
+SoupMeasures readMeasures(Fields& from) {
     SoupMeasures m;
     m.boundsMin = from.vector("min");
     m.boundsMax = from.vector("max");
@@ -91,10 +90,15 @@ SoupMeasures measuresFrom(Fields& all) {
     m.vertices = from.count("vertices");
     m.hasVertexColours = from.truth("vertex colours");
     m.hasMaterials = from.truth("materials");
+    return m;
+}
+
+SoupMeasures measuresIn(Fields& all) {
+    Fields from(all.object("measures"));
+    const SoupMeasures m = readMeasures(from);
     const glm::dvec3 extent = m.boundsMax - m.boundsMin;
-    from.require(std::min({extent.x, extent.y, extent.z}) >= 0 && m.area > 0 && m.length > 0 &&
-                 m.triangles > m.degenerateTriangles);
-    all.require(from.areWhole());
+    all.require(from.areWhole() && std::min({extent.x, extent.y, extent.z}) >= 0 && m.area > 0 && m.length > 0 &&
+                m.triangles > m.degenerateTriangles);
     return m;
 }
 
@@ -227,6 +231,12 @@ json jsonOf(const SoupMeasures& m) {
             {"materials", m.hasMaterials}};
 }
 
+std::optional<SoupMeasures> measuresFrom(const json& object) {
+    Fields from(object);
+    const SoupMeasures measures = readMeasures(from);
+    return from.areWhole() ? std::optional(measures) : std::nullopt;
+}
+
 json jsonOf(const std::vector<SideFile>& files) {
     json pairs = json::array();
     for (const SideFile& each : files) pairs.push_back({bytesJson(each.path.native()), each.stamp});
@@ -240,7 +250,7 @@ Result<Recorded> recordedFrom(const json& journal, const std::filesystem::path& 
     recorded.stage = all.text("stage");
     recorded.build = all.text("build");
     all.require(recorded.stage == "read" || recorded.stage == "levels");
-    recorded.measures = measuresFrom(all);
+    recorded.measures = measuresIn(all);
     recorded.sideFiles = sideFilesFrom(all);
     recorded.files = filesFrom(all);
     if (recorded.stage == "levels") readLevels(all, recorded);

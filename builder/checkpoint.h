@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -29,6 +30,8 @@ std::string settingsText(const BuildOptions& options);
 std::string buildFingerprint(const BuildOptions& options);
 
 nlohmann::json jsonOf(const SoupMeasures& measures);
+/// Returns what jsonOf wrote; nothing where `object` has not all of it.
+std::optional<SoupMeasures> measuresFrom(const nlohmann::json& object);
 nlohmann::json jsonOf(const std::vector<SideFile>& files);
 
 /// What the journal's lines say together.

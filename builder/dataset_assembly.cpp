@@ -1,9 +1,10 @@
 #include "builder/dataset_assembly.h"
 
 #include <algorithm>
-#include <vector>
+#include <atomic>
 
 #include "builder/image_store.h"
+#include "builder/ordered_pages.h"
 #include "octree/page/page.h"
 #include "octree/vcp_writer.h"
 
@@ -20,8 +21,8 @@ StoredPage passagePage(uint32_t log2Cells) {
 }
 
 /// Gives every page a parent, and brings all into Morton order. The entry of a passage has no leaves.
-void addPassages(std::deque<PageSpool>& levels) {
-    for (PageSpool& level : levels) level.sortEntries();
+void addPassages(std::vector<JoinedSpools>& levels) {
+    for (JoinedSpools& level : levels) level.sortEntries();
     for (size_t level = levels.size() - 1; level > 0; --level) {
         std::vector<PageEntry>& parents = levels[level - 1].entries();
         std::vector<PageEntry> missing;
@@ -39,7 +40,7 @@ void addPassages(std::deque<PageSpool>& levels) {
 }
 
 /// Lets every parent name its children.
-void linkChildren(std::deque<PageSpool>& levels) {
+void linkChildren(std::vector<JoinedSpools>& levels) {
     uint64_t first = levels[0].entries().size();
     for (size_t level = 0; level + 1 < levels.size(); ++level) {
         size_t child = 0;
@@ -55,7 +56,7 @@ void linkChildren(std::deque<PageSpool>& levels) {
 }
 
 /// Tells of pages that do not know it themselves what parts the pages below them have.
-void foldParts(std::deque<PageSpool>& levels) {
+void foldParts(std::vector<JoinedSpools>& levels) {
     for (size_t level = levels.size() - 1; level > 0; --level) {
         std::vector<PageEntry>& parents = levels[level - 1].entries();
         auto parent = parents.begin();
@@ -67,7 +68,7 @@ void foldParts(std::deque<PageSpool>& levels) {
     }
 }
 
-void describeLevels(const std::deque<PageSpool>& levels, FileHeader& header) {
+void describeLevels(const std::vector<JoinedSpools>& levels, FileHeader& header) {
     header.levels = uint32_t(levels.size());
     header.pages = 0;
     for (size_t level = 0; level < levels.size(); ++level) {
@@ -79,23 +80,48 @@ void describeLevels(const std::deque<PageSpool>& levels, FileHeader& header) {
         header.pages += row.pages;
     }
     FinestFigures finest;
-    for (const PageSpool& level : levels)
+    for (const JoinedSpools& level : levels)
         for (const PageEntry& entry : level.entries()) finest.add(entry);
     header.certifiedErrorMax = finest.certifiedError;
     header.leaves = finest.leaves;
     header.hardLeaves = finest.hardLeaves;
 }
 
-Result<void> appendImages(const PageSpool& images, VcpWriter& writer) {
+/// Copies the pages of a level to their places in the file, on all threads; what is not as it was written is found on
+/// the way. The level's entries go.
+Result<void> copyPages(JoinedSpools& level, VcpWriter& writer, const StoredPage& passage,
+                       const std::function<Result<void>()>& copied) {
+    size_t end = 0;
+    for (PageEntry& entry : level.entries()) {
+        if (entry.leaves == 0) passage.describe(entry);
+        end = writer.place(entry) + 1;
+    }
+    const size_t count = level.entries().size(), first = end - count;
+    const auto copy = [&](size_t i) -> Result<void> {
+        const PageEntry& entry = level.entries()[i];
+        VCP_TRY_ASSIGN(const auto page, entry.leaves > 0 ? level.read(entry) : Result<StoredPage>(passage));
+        VCP_TRY(writer.write(first + i, page));
+        return copied();
+    };
+    VCP_TRY(level.wake());
+    VCP_TRY(forEachInOrder(count, copy));
+    level.rest();
+    std::vector<PageEntry>().swap(level.entries());
+    return {};
+}
+
+Result<void> copyImages(const PageSpool& images, VcpWriter& writer, const std::function<Result<void>()>& copied) {
     VCP_TRY_ASSIGN(auto tables, storedTables(images));
     if (tables.images.empty()) return {};
+    std::vector<uint64_t> offsets;
     const size_t tiles = tables.tiles.size();
     VCP_TRY(writer.beginImages(std::move(tables)));
-    for (size_t i = 0; i < tiles; ++i) {
+    for (size_t i = 0; i < tiles; ++i) offsets.push_back(writer.placeTile(images.entries()[i].storedBytes));
+    return forEachInOrder(tiles, [&](size_t i) -> Result<void> {
         VCP_TRY_ASSIGN(const auto tile, images.read(images.entries()[i]));
-        VCP_TRY(writer.appendTile(tile.geometry));
-    }
-    return {};
+        VCP_TRY(writer.writeTile(offsets[i], tile.geometry));
+        return copied();
+    });
 }
 
 }  // namespace
@@ -117,23 +143,22 @@ FileHeader headerOf(const SoupMeasures& measures, const GridFrame& frame, double
     return header;
 }
 
-Result<uint64_t> assembleDataset(std::deque<PageSpool>& levels, FileHeader& header, const std::filesystem::path& output,
-                                 const OutputRules& rules, const PageSpool* images,
+Result<uint64_t> assembleDataset(std::vector<JoinedSpools>& levels, FileHeader& header,
+                                 const std::filesystem::path& output, const OutputRules& rules, const PageSpool* images,
                                  const std::function<bool(double)>& progress) {
     addPassages(levels);
     linkChildren(levels);
     foldParts(levels);
     describeLevels(levels, header);
     VCP_TRY_ASSIGN(auto writer, VcpWriter::create(output, header.pages, rules));
-    uint64_t done = 0;
-    for (const PageSpool& level : levels)
-        for (const PageEntry& entry : level.entries()) {
-            VCP_TRY_ASSIGN(auto page,
-                           entry.leaves > 0 ? level.read(entry) : Result<StoredPage>(passagePage(header.log2Cells)));
-            VCP_TRY(writer->append(entry, page));
-            if (!progress(double(++done) / double(header.pages + 1))) return Error::cancelled(output.string());
-        }
-    if (images != nullptr) VCP_TRY(appendImages(*images, *writer));
+    const uint64_t count = header.pages + (images != nullptr ? images->entries().size() : 0) + 1;
+    std::atomic<uint64_t> done = 0;
+    const auto copied = [&]() -> Result<void> {
+        return progress(double(++done) / double(count)) ? Result<void>() : Error::cancelled(output.string());
+    };
+    const StoredPage passage = passagePage(header.log2Cells);
+    for (JoinedSpools& level : levels) VCP_TRY(copyPages(level, *writer, passage, copied));
+    if (images != nullptr) VCP_TRY(copyImages(*images, *writer, copied));
     return writer->commit(header);
 }
 

@@ -80,17 +80,34 @@ Result<void> buildLarge(const PageTasks& tasks, InOrder& inOrder, std::vector<bo
 
 }  // namespace
 
+Result<void> forEachInOrder(size_t count, const std::function<Result<void>(size_t)>& work) {
+    std::atomic<size_t> next = 0;
+    std::atomic<bool> stopped = false;
+    std::mutex mutex;
+    Result<void> result;
+    tbb::parallel_for(
+        0, tbb::this_task_arena::max_concurrency(),
+        [&](int) {
+            for (size_t i; !stopped && (i = next++) < count;) {
+                auto done = work(i);
+                if (done) continue;
+                const std::scoped_lock lock(mutex);
+                if (!stopped.exchange(true)) result = done;
+            }
+        },
+        tbb::simple_partitioner());
+    return result;
+}
+
 Result<void> buildInOrder(const PageTasks& tasks) {
     const size_t count = tasks.work.size();
     InOrder inOrder(tasks.pages, tasks.surfaces);
     std::vector<bool> isBuilt(count, false);
     VCP_TRY(buildLarge(tasks, inOrder, isBuilt));
     Admission admission(tasks.pageBytes);
-    std::atomic<size_t> next = 0, done = 0;
-    std::atomic<bool> stopped = false;
-    std::mutex mutex;
-    Result<void> result;
-    const auto buildOne = [&](size_t i) -> Result<void> {
+    std::atomic<size_t> done = 0;
+    // Pages differ in weight. Taken in order, few must wait for an earlier one.
+    return forEachInOrder(count, [&](size_t i) -> Result<void> {
         Result<void> put;
         if (!isBuilt[i]) {
             admission.enter(tasks.work[i]);
@@ -100,20 +117,7 @@ Result<void> buildInOrder(const PageTasks& tasks) {
         }
         if (put && !tasks.progress(double(++done) / double(count))) return Error::cancelled();
         return put;
-    };
-    // Pages differ in weight, so they are taken one by one, in order: few must wait for an earlier one.
-    tbb::parallel_for(
-        0, tbb::this_task_arena::max_concurrency(),
-        [&](int) {
-            for (size_t i; !stopped && (i = next++) < count;) {
-                auto built = buildOne(i);
-                if (built) continue;
-                const std::scoped_lock lock(mutex);
-                if (!stopped.exchange(true)) result = built;
-            }
-        },
-        tbb::simple_partitioner());
-    return result;
+    });
 }
 
 }  // namespace vcp

@@ -10,6 +10,10 @@
 
 namespace vcp {
 
+/// Calls work(0) to work(count - 1) from the calling arena's threads, which take them one by one, in order. Where one
+/// fails no more are taken, and its error is returned.
+Result<void> forEachInOrder(size_t count, const std::function<Result<void>(size_t)>& work);
+
 /// A page that is built, and the surface in it from which the page above is made (storedSurface).
 struct BuiltPage {
     PageEntry entry;

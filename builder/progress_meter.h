@@ -17,13 +17,17 @@ class ProgressMeter {
 public:
     explicit ProgressMeter(const std::function<bool(const BuildProgress&)>& callback) : callback_(callback) {}
 
-    /// `now`: stage and time are filled in here. Returns false once the callback has cancelled.
+    /// Says that so much of the build was done before this run; before the first report.
+    void beginAt(double fraction) { begun_ = fraction_ = fraction; }
+
+    /// `now`: stage, time and where the run began are filled in here. Returns false once the callback has cancelled.
     bool report(const std::string& stage, BuildProgress now) {
         if (!callback_) return true;
         const std::scoped_lock lock(mutex_);
         if (cancelled_) return false;
         const bool isNews = stage != stage_ || now.fraction >= 1;
         now.fraction = fraction_ = std::max(fraction_, std::min(now.fraction, 1.0));
+        now.begun = begun_;
         now.seconds = seconds();
         if (now.seconds - lastSeconds_ < 0.1 && !isNews) return true;
         lastSeconds_ = now.seconds;
@@ -42,7 +46,7 @@ private:
     const std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
     std::mutex mutex_;
     std::string stage_;  // the stage that was reported last
-    double lastSeconds_ = -1, fraction_ = 0;
+    double lastSeconds_ = -1, fraction_ = 0, begun_ = 0;
     bool cancelled_ = false;
 };
 

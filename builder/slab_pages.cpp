@@ -59,6 +59,17 @@ std::vector<Siblings> siblingsIn(const PageSpool& spool) {
     return runs;
 }
 
+Result<void> keepSurfaces(const PageSpool& below, Siblings siblings, PageSpool& kept) {
+    for (size_t i = siblings.first; i < siblings.end; ++i) {
+        const PageEntry& entry = below.entries()[i];
+        VCP_TRY_ASSIGN(const auto stored, below.read(entry));
+        const auto halves = surfaceFrom(stored);
+        if (!halves) return below.damaged(entry);
+        VCP_TRY(kept.append({.morton = entry.morton}, storedSurface(*halves, true)));
+    }
+    return {};
+}
+
 Result<void> buildSlabPages(const LevelSettings& settings, const PageSpool& below, std::span<const Siblings> parents,
                             PageSpool& pages, PageSpool* surfaces, const std::function<bool(double)>& progress) {
     std::vector<uint64_t> work;

@@ -17,6 +17,9 @@ struct Siblings {
 /// Returns the pages of a spool by their parents, in Morton order.
 std::vector<Siblings> siblingsIn(const PageSpool& spool);
 
+/// Appends the surfaces of some pages to another spool, coded. Errors: Io, InvalidInput (damaged).
+Result<void> keepSurfaces(const PageSpool& below, Siblings siblings, PageSpool& kept);
+
 /// Builds the pages above those whose surfaces are in `below`. `parents`: some of siblingsIn(below). Appends pages to
 /// `pages` and, where that is not null, their surfaces to `surfaces`. `progress`, threads and errors are those of
 /// buildPages.

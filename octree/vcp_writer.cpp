@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <utility>
 
 #include "octree/io/content_hash.h"
 #include "octree/page/page_codec.h"
@@ -21,6 +22,15 @@ StoredPage storedPage(PackedPage packed, std::span<const std::byte> colour) {
 
 }  // namespace
 
+void StoredPage::describe(PageEntry& entry) const {
+    entry.storedBytes = uint32_t(geometry.size());
+    entry.pageBytes = geometryBytes;
+    entry.hash = hashBytes(geometry);
+    entry.colourStoredBytes = uint32_t(colour.size());
+    entry.colourBytes = colour.empty() ? 0 : colourBytes;
+    entry.colourHash = colour.empty() ? 0 : hashBytes(colour);
+}
+
 StoredPage compressPage(std::span<const std::byte> geometry, std::span<const std::byte> colour) {
     return storedPage(packPage(geometry, colour), colour);
 }
@@ -37,25 +47,29 @@ Result<std::unique_ptr<VcpWriter>> VcpWriter::create(const std::filesystem::path
 }
 
 VcpWriter::VcpWriter(OutputFile file, uint64_t pages)
-    : file_(std::move(file)), end_(alignPage(kDirectoryOffset + directoryBytes(pages))), pages_(pages) {}
+    : file_(std::move(file)), end_(alignPage(kDirectoryOffset + directoryBytes(pages))), pages_(pages) {
+    entries_.reserve(pages);
+}
 
-Result<void> VcpWriter::append(PageEntry entry, const StoredPage& page) {
+size_t VcpWriter::place(PageEntry entry) {
     entry.offset = end_;
-    entry.storedBytes = uint32_t(page.geometry.size());
-    entry.pageBytes = page.geometryBytes;
-    entry.hash = hashBytes(page.geometry);
-    VCP_TRY(file_.write(end_, page.geometry));
-    end_ = alignPage(end_ + page.geometry.size());
-    if (!page.colour.empty()) {
-        entry.colourOffset = end_;
-        entry.colourStoredBytes = uint32_t(page.colour.size());
-        entry.colourBytes = page.colourBytes;
-        entry.colourHash = hashBytes(page.colour);
-        VCP_TRY(file_.write(end_, page.colour));
-        end_ = alignPage(end_ + page.colour.size());
-    }
+    end_ = alignPage(end_ + entry.storedBytes);
+    entry.colourOffset = entry.colourStoredBytes > 0 ? end_ : 0;
+    end_ = alignPage(end_ + entry.colourStoredBytes);
     entries_.push_back(entry);
-    return {};
+    return entries_.size() - 1;
+}
+
+Result<void> VcpWriter::write(size_t number, const StoredPage& page) {
+    const PageEntry& placed = entries_[number];
+    VCP_TRY(file_.write(placed.offset, page.geometry));
+    return page.colour.empty() ? Result<void>() : file_.write(placed.colourOffset, page.colour);
+}
+
+Result<void> VcpWriter::append(const PageEntry& entry, const StoredPage& page) {
+    PageEntry described = entry;
+    page.describe(described);
+    return write(place(described), page);
 }
 
 Result<void> VcpWriter::beginImages(ImageTables tables) {
@@ -75,10 +89,14 @@ Result<void> VcpWriter::beginImages(ImageTables tables) {
     return {};
 }
 
+uint64_t VcpWriter::placeTile(uint64_t bytes) { return std::exchange(end_, end_ + bytes); }
+
+Result<void> VcpWriter::writeTile(uint64_t offset, std::span<const std::byte> stored) {
+    return file_.write(offset, stored);
+}
+
 Result<void> VcpWriter::appendTile(std::span<const std::byte> stored) {
-    VCP_TRY(file_.write(end_, stored));
-    end_ += stored.size();
-    return {};
+    return writeTile(placeTile(stored.size()), stored);
 }
 
 Result<uint64_t> VcpWriter::commit(FileHeader header) {

@@ -4,11 +4,10 @@
 #include <cerrno>
 
 #include <fmt/format.h>
-#include <oneapi/tbb/global_control.h>
-#include <oneapi/tbb/task_arena.h>
 
 #include "builder/mesh/open_mesh.h"
 #include "builder/parts/part_dealing.h"
+#include "builder/work_arena.h"
 #include "octree/io/caught.h"
 #include "octree/io/durable_file.h"
 #include "octree/io/output_file.h"
@@ -104,12 +103,7 @@ Result<PartReport> runStage(const PartStep& step, const PartSetting& setting) {
 }
 
 Result<PartReport> run(const PartStep& step, const PartPlan& plan, const std::function<bool(double)>& progress) {
-    const unsigned threads = threadsOf(plan.options);
-    std::optional<oneapi::tbb::global_control> more;
-    using Control = oneapi::tbb::global_control;
-    if (threads > Control::active_value(Control::max_allowed_parallelism))
-        more.emplace(Control::max_allowed_parallelism, threads);
-    oneapi::tbb::task_arena arena{int(threads)};
+    WorkArena arena(threadsOf(plan.options));
     return arena.execute([&] { return runStage(step, {step.folder, plan, &progress}); });
 }
 

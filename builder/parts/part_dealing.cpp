@@ -33,24 +33,15 @@ json jsonOf(const SoupTally& tally) {
             {"content", tally.content}};
 }
 
-glm::dvec3 vectorFrom(const json& j) { return {j.at(0).get<double>(), j.at(1).get<double>(), j.at(2).get<double>()}; }
-
-SoupTally tallyFrom(const json& j) {
+std::optional<SoupTally> tallyFrom(const json& j) {
     SoupTally tally;
-    const json& counted = j.at("measures");
-    SoupMeasures m{.boundsMin = vectorFrom(counted.at("min")),
-                   .boundsMax = vectorFrom(counted.at("max")),
-                   .triangles = counted.at("triangles").get<uint64_t>(),
-                   .degenerateTriangles = counted.at("degenerate").get<uint64_t>(),
-                   .cutTriangles = counted.at("cut").get<uint64_t>(),
-                   .vertices = counted.at("vertices").get<uint64_t>(),
-                   .hasVertexColours = counted.at("vertex colours").get<bool>(),
-                   .hasMaterials = counted.at("materials").get<bool>()};
-    if (m.triangles == 0) {
-        m.boundsMin = tally.counted.boundsMin;
-        m.boundsMax = tally.counted.boundsMax;
+    auto counted = measuresFrom(j.at("measures"));
+    if (!counted) return std::nullopt;
+    if (counted->triangles == 0) {
+        counted->boundsMin = tally.counted.boundsMin;
+        counted->boundsMax = tally.counted.boundsMax;
     }
-    tally.counted = m;
+    tally.counted = *counted;
     tally.area.add(j.at("area").get<std::vector<uint64_t>>());
     tally.length.add(j.at("length").get<std::vector<uint64_t>>());
     tally.isTooLarge = j.at("too large").get<bool>();
@@ -96,9 +87,10 @@ private:
         const auto before = uint32_t(materials.size());
         VCP_TRY_ASSIGN(const auto more, recordedMaterials(fields.at("materials"), space, isWanted));
         materials.insert(materials.end(), more.begin(), more.end());
-        const SoupTally own = tallyFrom(fields.at("tally"));
-        tally.add(own);
-        contents.push_back(own.content);
+        const auto own = tallyFrom(fields.at("tally"));
+        if (!own) return damagedTempFile(space.folder().path() / kJournalName);
+        tally.add(*own);
+        contents.push_back(own->content);
         const auto said = fields.at("warnings").get<std::vector<std::string>>();
         warnings.insert(warnings.end(), said.begin(), said.end());
         for (const json& each : fields.at("side files")) {

@@ -1,6 +1,7 @@
 #include "builder/parts/part_steps.h"
 
 #include <algorithm>
+#include <atomic>
 #include <deque>
 #include <span>
 #include <utility>
@@ -11,6 +12,7 @@
 #include "builder/dataset_assembly.h"
 #include "builder/lattice/mesh_textures.h"
 #include "builder/level/vertex_step.h"
+#include "builder/ordered_pages.h"
 #include "builder/slab_pages.h"
 
 namespace vcp {
@@ -29,19 +31,14 @@ Result<json> recordedSpools(std::deque<PageSpool>& spools) {
     return lengths;
 }
 
-/// Appends the pages of a part that is done to those that are at hand.
-Result<void> gather(const DonePart& part, const char* field, const char* prefix, std::deque<PageSpool>& to) {
-    const json& lengths = part.fields.at(field);
-    for (uint32_t level = 0; level < to.size(); ++level) {
-        PageSpool from(*part.space, level, prefix);
-        const auto bytes = lengths.at(level).at(0).get<uint64_t>();
-        if (bytes == 0) continue;
-        VCP_TRY(from.reopen(bytes, lengths.at(level).at(1).get<uint64_t>()));
-        for (const PageEntry& entry : from.entries()) {
-            VCP_TRY_ASSIGN(const auto page, from.read(entry));
-            VCP_TRY(to[level].append(entry, page));
-        }
+/// Appends the pages of a spool whose files are closed to another.
+Result<void> appendPages(PageSpool& from, PageSpool& to) {
+    VCP_TRY(from.wake());
+    for (const PageEntry& entry : from.entries()) {
+        VCP_TRY_ASSIGN(const auto page, from.read(entry));
+        VCP_TRY(to.append(entry, page));
     }
+    from.rest();
     return {};
 }
 
@@ -49,6 +46,17 @@ std::deque<PageSpool> makeSpools(TempSpace& space, uint32_t levels, const char* 
     std::deque<PageSpool> spools;
     for (uint32_t level = 0; level < levels; ++level) spools.emplace_back(space, level, prefix);
     return spools;
+}
+
+/// Opens the spools of a part that is done, each with its entries, and closes their files again.
+Result<void> openSpools(const DonePart& part, const char* field, std::deque<PageSpool>& spools) {
+    const json& lengths = part.fields.at(field);
+    for (size_t level = 0; level < spools.size(); ++level) {
+        const auto bytes = lengths.at(level).at(0).get<uint64_t>();
+        if (bytes > 0) VCP_TRY(spools[level].reopen(bytes, lengths.at(level).at(1).get<uint64_t>()));
+        spools[level].rest();
+    }
+    return {};
 }
 
 using DoneParts = std::vector<std::shared_ptr<const DonePart>>;
@@ -184,13 +192,58 @@ Result<void> buildAbove(const PartContext& context, unsigned part, TempSpace& sp
                 own.push_back(each);
                 continue;
             }
-            for (size_t i = each.first; i < each.end; ++i) {
-                VCP_TRY_ASSIGN(const auto surface, below.read(below.entries()[i]));
-                VCP_TRY(kept[size_t(level) + 1].append({.morton = below.entries()[i].morton}, surface));
-            }
+            VCP_TRY(keepSurfaces(below, each, kept[size_t(level) + 1]));
         }
         VCP_TRY(buildSlabPages(context.settingsOf(level, false, space), below, own, pages[size_t(level)],
                                level > 0 ? &surfaces[size_t(level)] : nullptr, *context.progress));
+        below.remove();
+    }
+    return {};
+}
+
+// Shares of the time of `merge`, at which one is done and the next begins.
+constexpr double kPagesAreOpen = 0.1, kTopIsBuilt = 0.3;
+
+/// What a part of `pages` left: pages, and the surface in those whose parents belong to several parts.
+struct PartPages {
+    DonePart done;
+    std::deque<PageSpool> pages, kept;
+};
+
+/// Opens what the parts of `pages` left, on all threads. Errors: openPart's; Usage (PartContext::open).
+Result<std::vector<std::unique_ptr<PartPages>>> openPages(const PartContext& context) {
+    const uint32_t levels = context.levels.frame.levels;
+    std::vector<std::unique_ptr<PartPages>> parts(context.plan.parts);
+    std::atomic<unsigned> opened = 0;
+    const auto open = [&](size_t k) -> Result<void> {
+        VCP_TRY_ASSIGN(auto done, context.open("pages", unsigned(k)));
+        auto part = std::make_unique<PartPages>(std::move(done));
+        part->pages = makeSpools(*part->done.space, levels, "");
+        part->kept = makeSpools(*part->done.space, levels, "kept");
+        VCP_TRY(openSpools(part->done, "pages", part->pages));
+        VCP_TRY(openSpools(part->done, "kept", part->kept));
+        parts[k] = std::move(part);
+        const double share = double(++opened) / double(parts.size());
+        return (*context.progress)(kPagesAreOpen * share) ? Result<void>() : Error::cancelled();
+    };
+    VCP_TRY(forEachInOrder(parts.size(), open));
+    return parts;
+}
+
+/// Builds the pages that have something of several parts below them.
+Result<void> buildTop(const PartContext& context, const std::vector<std::unique_ptr<PartPages>>& parts,
+                      TempSpace& space, std::deque<PageSpool>& pages, std::deque<PageSpool>& surfaces) {
+    const int levels = context.levels.levels();
+    for (int level = levels - 2; level >= 0; --level) {
+        PageSpool& below = surfaces[size_t(level) + 1];
+        for (const auto& part : parts) VCP_TRY(appendPages(part->kept[size_t(level) + 1], below));
+        below.sortEntries();
+        const auto report = [&](double part) {
+            const double share = (double(levels - 2 - level) + part) / double(levels - 1);
+            return (*context.progress)(kPagesAreOpen + (kTopIsBuilt - kPagesAreOpen) * share);
+        };
+        VCP_TRY(buildSlabPages(context.settingsOf(level, false, space), below, siblingsIn(below), pages[size_t(level)],
+                               level > 0 ? &surfaces[size_t(level)] : nullptr, report));
         below.remove();
     }
     return {};
@@ -246,7 +299,8 @@ uint64_t PartContext::firstCode(unsigned part) const {
 LevelSettings PartContext::settingsOf(int level, bool isFinest, TempSpace& space) const {
     LevelSettings settings = levels.settingsOf(level, isFinest);
     settings.withColour = hasColour;
-    settings.codesSurface = true;
+    // Few are kept, and these are coded then.
+    settings.codesSurface = space.diskBytes() > 0 || !space.isAmple(0);
     settings.roomBytes = memory.tempBytes;
     settings.makeRoom = [&space] { return space.spill(); };
     return settings;
@@ -362,36 +416,27 @@ Result<void> runPages(const PartContext& context, unsigned number, NewPart& made
 
 Result<BuildFigures> runMerge(const PartContext& context, NewPart& made) {
     const LevelPlan& levels = context.levels;
+    VCP_TRY_ASSIGN(const auto parts, openPages(context));
     TempSpace& space = made.space(context.memory.tempBytes);
     std::deque<PageSpool> pages = makeSpools(space, levels.frame.levels, ""),
                           surfaces = makeSpools(space, levels.frame.levels, "surface");
-    PartCounts counts;
-    for (unsigned k = 0; k < context.plan.parts; ++k) {
-        VCP_TRY_ASSIGN(const auto part, context.open("pages", k));
-        VCP_TRY(gather(part, "pages", "", pages));
-        VCP_TRY(gather(part, "kept", "kept", surfaces));
-        const json& noted = part.fields.at("mesh parts");
-        counts = {noted.at(0).get<uint64_t>(), noted.at(1).get<uint64_t>(), noted.at(2).get<uint64_t>()};
-        if (!(*context.progress)(double(k) / double(2 * context.plan.parts))) return Error::cancelled();
+    VCP_TRY(buildTop(context, parts, space, pages, surfaces));
+    std::vector<JoinedSpools> joined(pages.size());
+    for (size_t level = 0; level < joined.size(); ++level) {
+        joined[level].add(pages[level]);
+        for (const auto& part : parts) joined[level].add(part->pages[level]);
     }
-    for (int level = levels.levels() - 2; level >= 0; --level) {
-        PageSpool& below = surfaces[size_t(level) + 1];
-        below.sortEntries();
-        VCP_TRY(buildSlabPages(context.settingsOf(level, false, space), below, siblingsIn(below), pages[size_t(level)],
-                               level > 0 ? &surfaces[size_t(level)] : nullptr,
-                               [&](double) { return (*context.progress)(0.5); }));
-        below.remove();
-    }
-    const SoupMeasures& measures = context.recorded.measures;
-    FileHeader header = headerOf(levels, measures, context.hasColour, counts);
+    const json& noted = parts.back()->done.fields.at("mesh parts");
+    const PartCounts counts{noted.at(0).get<uint64_t>(), noted.at(1).get<uint64_t>(), noted.at(2).get<uint64_t>()};
+    FileHeader header = headerOf(levels, context.recorded.measures, context.hasColour, counts);
     OutputRules rules{.overwrite = context.plan.options.overwrite, .inputs = context.plan.options.inputs};
     for (const SideFile& each : context.recorded.sideFiles) rules.inputs.push_back(each.path);
     VCP_TRY_ASSIGN(const auto images, openImages(context));
     BuildFigures figures;
-    VCP_TRY_ASSIGN(figures.fileBytes, assembleDataset(pages, header, context.plan.options.output, rules,
-                                                      images.empty() ? nullptr : &images.front(), [&](double part) {
-                                                          return (*context.progress)(0.5 + part / 2);
-                                                      }));
+    VCP_TRY_ASSIGN(
+        figures.fileBytes,
+        assembleDataset(joined, header, context.plan.options.output, rules, images.empty() ? nullptr : &images.front(),
+                        [&](double part) { return (*context.progress)(kTopIsBuilt + (1 - kTopIsBuilt) * part); }));
     describe(header, figures);
     return figures;
 }

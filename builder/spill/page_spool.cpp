@@ -1,7 +1,9 @@
 #include "builder/spill/page_spool.h"
 
 #include <algorithm>
+#include <iterator>
 #include <limits>
+#include <utility>
 
 #include <fmt/format.h>
 #include <xxhash.h>
@@ -34,12 +36,7 @@ uint64_t PageSpool::hashOf(const PageEntry& entry, uint64_t number) const {
 }
 
 Result<void> PageSpool::append(PageEntry entry, const StoredPage& page) {
-    entry.storedBytes = uint32_t(page.geometry.size());
-    entry.pageBytes = page.geometryBytes;
-    entry.colourStoredBytes = uint32_t(page.colour.size());
-    entry.colourBytes = page.colourBytes;
-    entry.hash = hashBytes(page.geometry);
-    entry.colourHash = page.colour.empty() ? 0 : hashBytes(page.colour);
+    page.describe(entry);
     VCP_TRY_ASSIGN(entry.offset, pages_.append(page.geometry));
     VCP_TRY(pages_.append(page.colour));
     const SpooledEntry spooled{entry, hashOf(entry, entries_.size())};
@@ -91,10 +88,46 @@ Result<StoredPage> PageSpool::read(const PageEntry& entry) const {
 
 void PageSpool::sortEntries() { std::ranges::sort(entries_, {}, &PageEntry::morton); }
 
+void PageSpool::rest() {
+    pages_.rest();
+    directory_.rest();
+}
+
 void PageSpool::remove() {
     pages_.remove();
     directory_.remove();
     entries_.clear();
 }
+
+void JoinedSpools::add(PageSpool& spool) {
+    if (spool.bytes() == 0) return;
+    for (PageEntry& entry : spool.entries()) entry.offset += end_;
+    if (entries_.empty())
+        entries_ = std::move(spool.entries());
+    else
+        entries_.insert(entries_.end(), spool.entries().begin(), spool.entries().end());
+    std::vector<PageEntry>().swap(spool.entries());
+    sources_.push_back({end_, &spool});
+    end_ += spool.bytes();
+}
+
+void JoinedSpools::rest() {
+    for (const Source& each : sources_) each.spool->rest();
+}
+
+Result<void> JoinedSpools::wake() {
+    for (const Source& each : sources_) VCP_TRY(each.spool->wake());
+    return {};
+}
+
+Result<StoredPage> JoinedSpools::read(const PageEntry& entry) const {
+    const auto behind = std::ranges::upper_bound(sources_, entry.offset, {}, &Source::begin);
+    const Source& from = *std::prev(behind);
+    PageEntry own = entry;
+    own.offset -= from.begin;
+    return from.spool->read(own);
+}
+
+void JoinedSpools::sortEntries() { std::ranges::sort(entries_, {}, &PageEntry::morton); }
 
 }  // namespace vcp

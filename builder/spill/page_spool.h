@@ -28,6 +28,10 @@ public:
     Result<StoredPage> read(const PageEntry& entry) const;
     /// Returns the error that says that a page is damaged.
     [[nodiscard]] Error damaged(const PageEntry& entry) const { return damagedTempFile(pages_.path(), entry.offset); }
+    /// Closes the files of a spool that another build finished, whose entries stay; wake() opens that of the pages
+    /// again (TempFile::rest). Errors of wake: reopen's.
+    void rest();
+    Result<void> wake() { return pages_.wake(); }
     void remove();
     /// Brings the entries that are in memory into Morton order.
     void sortEntries();
@@ -43,6 +47,32 @@ private:
 
     uint32_t level_;
     TempFile pages_, directory_;
+    std::vector<PageEntry> entries_;
+};
+
+/// The pages of a level, in one spool or in those of many parts. The offset of an entry counts on from spool to spool:
+/// the sum of the bytes before its spool is where that begins.
+class JoinedSpools {
+public:
+    /// Takes over the entries of a spool, which outlives this; their bytes stay where they are.
+    void add(PageSpool& spool);
+    /// Does so with the files of all spools (PageSpool::rest). Errors: PageSpool::wake's.
+    void rest();
+    Result<void> wake();
+    /// Returns a page as it was appended; any thread. Errors: PageSpool::read's.
+    [[nodiscard]] Result<StoredPage> read(const PageEntry& entry) const;
+    void sortEntries();
+
+    [[nodiscard]] std::vector<PageEntry>& entries() { return entries_; }
+    [[nodiscard]] const std::vector<PageEntry>& entries() const { return entries_; }
+
+private:
+    struct Source {
+        uint64_t begin;
+        PageSpool* spool;
+    };
+    std::vector<Source> sources_;  ///< those with any bytes
+    uint64_t end_ = 0;
     std::vector<PageEntry> entries_;
 };
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <utility>
 
 #include "octree/io/durable_file.h"
 
@@ -125,6 +126,19 @@ Result<void> TempFile::reopen(uint64_t bytes) {
     flushed_ = end_ = bytes;
     space_.addDisk(int64_t(bytes));
     return {};
+}
+
+void TempFile::rest() {
+    if (file_ < 0 || space_.folder().use() == FolderUse::Own) return;
+    ::close(file_);
+    file_ = -1;
+    isAtRest_ = true;
+}
+
+Result<void> TempFile::wake() {
+    if (!std::exchange(isAtRest_, false)) return {};
+    space_.addDisk(-int64_t(flushed_));
+    return reopen(flushed_);
 }
 
 void TempFile::remove() {

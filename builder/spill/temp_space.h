@@ -77,6 +77,10 @@ public:
     /// Takes over what an interrupted build left, cut to `bytes`, in the held folder; to read, nothing is cut. Errors:
     /// Io (not a file of a build's own); InvalidInput (missing, shorter).
     Result<void> reopen(uint64_t bytes);
+    /// Closes a file that another build finished, until wake() opens it again as it was; meanwhile nothing is read. A
+    /// build's own files stay open. Errors of wake: reopen's.
+    void rest();
+    Result<void> wake();
     /// Frees memory and disk.
     void remove();
 
@@ -91,6 +95,7 @@ private:
     std::string name_;
     int file_ = -1;
     bool isNamed_ = false;  ///< the folder's entry is durable
+    bool isAtRest_ = false;
     uint64_t flushed_ = 0;  ///< bytes on the disk; the rest is in tail_
     std::atomic<uint64_t> end_ = 0;
     std::vector<std::unique_ptr<std::byte[]>> tail_;

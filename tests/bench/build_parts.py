@@ -25,11 +25,11 @@ import shutil
 
 PROCESSORS_USED = 0.75
 PROCESS_BYTES, ALL_BYTES = 1e9, 20e9  # a second
-# Bytes a triangle that a stage reads and writes: the input, the soup (written, read twice, read), bins, pages.
+# Bytes a triangle that a stage reads and writes: the input, the soup (written, read three times, read), bins, pages.
 STAGE_BYTES = {
     "plan": 19,
     "read": 19 + 18,
-    "count": 2 * 18,
+    "count": 3 * 18,
     "deal": 18 + 22,
     "vertices": 22 + 29,
     "pages": 29 + 2 * 22 + 4,

@@ -145,6 +145,28 @@ TEST_F(UnfinishedBuild, FlippedBitsAreFoundOrHarmless) {
     }
 }
 
+TEST_F(UnfinishedBuild, ProgressGoesOnFromWhereItWas) {
+    double last = 0;
+    for (const std::string stage : {"sorting", "level 2 of", "writing"}) {
+        stopAt(stage);
+        std::vector<BuildProgress> told;
+        BuildOptions o = options();
+        o.resume = true;
+        o.progress = [&](const BuildProgress& now) { return told.push_back(now), true; };
+        const auto report = buildOctree(o);
+        ASSERT_TRUE(report) << report.error().line();
+        ASSERT_GE(told.size(), 2u) << stage;
+        EXPECT_GT(told.front().begun, last) << stage << ": more was done than where it was stopped before";
+        EXPECT_LT(told.front().begun, 1) << stage;
+        for (const BuildProgress& each : told) {
+            EXPECT_EQ(each.begun, told.front().begun) << each.stage;
+            EXPECT_GE(each.fraction, each.begun) << each.stage;
+        }
+        last = told.front().begun;
+        fs::remove(output());
+    }
+}
+
 TEST_F(UnfinishedBuild, FlippedBitsInTheSameRunAreFound) {
     // The disk gives back something else while the build runs on.
     for (const std::string& name : {std::string("pages"), std::string("entries")}) {

@@ -177,7 +177,9 @@ Json toJson(const BuildFigures& figures) {
             {"error_target", figures.errorTarget},    {"certified_error_max", figures.certifiedErrorMax}};
 }
 
-ProgressDetails detailsOf(const BuildProgress& at) { return {.triangles = at.triangles, .tempBytes = at.tempBytes}; }
+ProgressDetails detailsOf(const BuildProgress& at) {
+    return {.triangles = at.triangles, .tempBytes = at.tempBytes, .begun = at.begun};
+}
 
 std::function<bool(const BuildProgress&)> shownProgress(ProgressStyle style) {
     return [display = std::make_shared<ProgressDisplay>(style, stderr)](const BuildProgress& at) {

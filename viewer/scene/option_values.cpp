@@ -170,9 +170,10 @@ std::string formatSeconds(double seconds) {
     return fmt::format("{} h {:02} min", whole / 3600, whole / 60 % 60);
 }
 
-std::optional<double> secondsLeft(double seconds, double fraction) {
-    if (!(seconds > 1 && fraction > 0.01)) return std::nullopt;
-    return seconds * (1 - fraction) / fraction;
+std::optional<double> secondsLeft(double seconds, double fraction, double begun) {
+    const double done = fraction - begun;
+    if (!(seconds > 1 && done > 0.01 * (1 - begun))) return std::nullopt;
+    return seconds * (1 - fraction) / done;
 }
 
 std::string formatTimeLeft(double seconds) {

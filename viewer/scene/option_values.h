@@ -78,9 +78,9 @@ std::string formatLength(double length);
 /// Returns a text such as "0.82 s" or "3 min 05 s".
 std::string formatSeconds(double seconds);
 
-/// Returns about how long work goes on of which a fraction took `seconds`; nothing in its first moments, which say
-/// little about the rest.
-std::optional<double> secondsLeft(double seconds, double fraction);
+/// Returns about how long work goes on that came from the fraction `begun` to `fraction` in so many seconds; nothing in
+/// its first moments, which say little about the rest.
+std::optional<double> secondsLeft(double seconds, double fraction, double begun = 0);
 
 /// Returns such a time as a text: it is no more than a guess of whole seconds.
 std::string formatTimeLeft(double seconds);

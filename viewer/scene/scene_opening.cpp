@@ -199,7 +199,7 @@ Result<OpenedScene> SceneOpening::open() {
     build.progress = [this, told = std::move(build.progress)](const BuildProgress& at) {
         const bool goesOn = !told || told(at);
         const std::lock_guard lock(mutex_);
-        progress_ = {at.stage, at.fraction, at.triangles, at.seconds};
+        progress_ = {at.stage, at.fraction, at.triangles, at.seconds, at.begun};
         return goesOn && !*cancelled_;
     };
     return openScene(inputs_, build, access_, {}, true);

@@ -113,6 +113,7 @@ public:
         double fraction = 0;
         uint64_t triangles = 0;
         double seconds = 0;  ///< since the build began
+        double begun = 0;    ///< fraction that an earlier run had done
     };
 
     /// Takes what openScene takes. `build.progress` is called in the thread, and destroyed when the work is done.

@@ -314,7 +314,7 @@ void Interface::layOutOpening() {
     valueRow(*look_, fitted(stage, 0.5f * width).c_str(), fmt::format("{:.0f} %", 100 * progress.fraction));
     progressBar(*look_, progress.fraction);
     if (progress.triangles > 0) valueRow(*look_, "Triangles", formatCount(progress.triangles));
-    if (const auto left = secondsLeft(progress.seconds, progress.fraction))
+    if (const auto left = secondsLeft(progress.seconds, progress.fraction, progress.begun))
         valueRow(*look_, "Time left", formatTimeLeft(*left));
     if (textButton(*look_, icon::kClose, "Cancel", {"", "Esc"})) opening.cancel();
     endCard();

@@ -1,8 +1,11 @@
 // Builds in parts: the bytes of a whole build, whatever the order; parts that are lost, cut off, killed or foreign.
 #include "builder/parts/part_dealing.h"
 
+#include <sys/resource.h>
 #include <algorithm>
+#include <csignal>
 #include <fstream>
+#include <iterator>
 #include <random>
 #include <thread>
 #include <utility>
@@ -88,6 +91,11 @@ protected:
         ASSERT_NO_FATAL_FAILURE(runAll("count", 1));
         ASSERT_NO_FATAL_FAILURE(runAll("deal", parts));
     }
+    void buildPages(unsigned parts) const {
+        ASSERT_NO_FATAL_FAILURE(dealAll(parts));
+        ASSERT_NO_FATAL_FAILURE(runAll("vertices", parts));
+        ASSERT_NO_FATAL_FAILURE(runAll("pages", parts));
+    }
     void planned(unsigned parts) const {
         const auto folder = planParts(options(), parts);
         ASSERT_TRUE(folder.ok()) << folder.error().line();
@@ -118,6 +126,65 @@ TEST_F(BuildParts, AreTheBytesOfTheWhole) {
         fs::remove_all(plan());
         fs::remove(output());
     }
+}
+
+/// Files that this process has open.
+size_t openFiles() { return size_t(std::distance(fs::directory_iterator("/proc/self/fd"), fs::directory_iterator())); }
+
+TEST_F(BuildParts, MergeCopiesOnAnyThreadsAndHasFewFilesOpen) {
+    constexpr unsigned kParts = 8;
+    planned(kParts);
+    ASSERT_NO_FATAL_FAILURE(buildPages(kParts));
+    rlimit before{};
+    getrlimit(RLIMIT_NOFILE, &before);
+    for (const unsigned threads : {1u, 2u, 7u}) {
+        // Of each part its folder and its pages of one level; those that are read at once, and some of the merge's own.
+        const rlimit few{openFiles() + 2 * kParts + 2 * threads + 16, before.rlim_max};
+        setrlimit(RLIMIT_NOFILE, &few);
+        const auto done = runPart({.folder = plan(), .stage = "merge", .threads = threads});
+        setrlimit(RLIMIT_NOFILE, &before);
+        ASSERT_TRUE(done.ok()) << done.error().line();
+        EXPECT_EQ(bytesOf(output()), whole_) << threads << " threads";
+        fs::remove(output());
+    }
+}
+
+TEST_F(BuildParts, AMergeThatEndsEarlyLeavesNothing) {
+    planned(3);
+    ASSERT_NO_FATAL_FAILURE(buildPages(3));
+    const auto expectNothing = [&] {
+        for (const fs::path& folder : {folder_.path(), plan()})
+            for (const auto& each : fs::directory_iterator(folder))
+                EXPECT_TRUE(each.path() != output() && each.path().extension() != ".partial" &&
+                            !each.path().filename().string().starts_with("merge"))
+                    << each.path();
+    };
+    for (const double after : {0.0, 0.5}) {
+        const auto done =
+            runPart({.folder = plan(), .stage = "merge", .threads = 3, .progress = [&](const BuildProgress& at) {
+                         std::this_thread::sleep_for(std::chrono::milliseconds(101));
+                         return at.fraction <= after;
+                     }});
+        ASSERT_FALSE(done.ok()) << after;
+        EXPECT_EQ(done.error().code, ErrorCode::Cancelled) << done.error().line();
+        expectNothing();
+    }
+    rlimit before{};
+    getrlimit(RLIMIT_FSIZE, &before);
+    auto* const handler = std::signal(SIGXFSZ, SIG_IGN);
+    for (const rlim_t limit : {rlim_t{4200}, rlim_t{whole_.size() / 2}, rlim_t{whole_.size() - 1}}) {
+        const rlimit small{limit, before.rlim_max};
+        setrlimit(RLIMIT_FSIZE, &small);
+        const auto full = run("merge", 0);
+        setrlimit(RLIMIT_FSIZE, &before);
+        ASSERT_FALSE(full.ok()) << limit;
+        EXPECT_EQ(full.error().code, ErrorCode::Io);
+        EXPECT_NE(full.error().line().find("out.vcp: write failed"), std::string::npos) << full.error().line();
+        expectNothing();
+    }
+    std::signal(SIGXFSZ, handler);
+    ASSERT_TRUE(run("merge", 0).ok());
+    EXPECT_EQ(bytesOf(output()), whole_);
 }
 
 TEST_F(BuildParts, TwoCopiesOfAPartAtOnce) {

@@ -1,6 +1,7 @@
 // Finished pages on temporary files: what is read is what was appended, or damage is named.
 #include "builder/spill/page_spool.h"
 
+#include <deque>
 #include <fstream>
 #include <random>
 
@@ -134,6 +135,45 @@ TEST_F(Pages, DamageAfterAnInterruptionIsNamed) {
     for (const uint64_t other : {bytes + 1, uint64_t{1} << 50, ~uint64_t{0}})
         EXPECT_FALSE(again(other, kPages).ok()) << other;
     EXPECT_FALSE(again(bytes - 1, kPages).ok());
+}
+
+TEST_F(Pages, OfSeveralSpoolsAreReadAsOne) {
+    std::deque<TempSpace> spaces;
+    std::deque<PageSpool> spools;
+    // Every third page, each in a folder of its own, and a spool without any.
+    for (uint64_t k = 0; k < 4; ++k) {
+        TempSpace space(folder_ / std::to_string(k), 0);
+        PageSpool spool(space, 2);
+        for (uint64_t i = k; k < 3 && i < kPages; i += 3)
+            ASSERT_TRUE(spool.append({.morton = i * 7, .leaves = uint32_t(i + 1)}, pageOf(i)).ok());
+        ASSERT_TRUE(spool.sync().ok());
+        spaces.emplace_back(folder_ / std::to_string(k), 0, FolderUse::Read);
+        ASSERT_TRUE(spaces.back().folder().take().ok());
+        spools.emplace_back(spaces.back(), 2);
+        ASSERT_TRUE(spools.back().reopen(spool.bytes(), spool.entries().size()).ok());
+        spools.back().rest();
+    }
+    JoinedSpools all;
+    for (const size_t k : {0, 3, 1, 2}) all.add(spools[k]);
+    all.sortEntries();
+    ASSERT_EQ(all.entries().size(), kPages);
+    for (int again = 0; again < 2; ++again) {
+        ASSERT_TRUE(all.wake().ok());
+        for (uint64_t i = 0; i < kPages; ++i) {
+            const auto page = all.read(all.entries()[i]);
+            ASSERT_TRUE(page.ok()) << page.error().line();
+            EXPECT_EQ(all.entries()[i].morton, i * 7);
+            EXPECT_TRUE(page->geometry == pageOf(i).geometry && page->colour == pageOf(i).colour) << i;
+        }
+        all.rest();
+    }
+    // Cut off while nobody looked.
+    const fs::path file = folder_ / "1" / spools[1].pagesFile();
+    fs::resize_file(file, fs::file_size(file) - 1);
+    const auto cut = all.wake();
+    ASSERT_FALSE(cut.ok());
+    EXPECT_EQ(cut.error().code, ErrorCode::InvalidInput);
+    EXPECT_EQ(cut.error().file, file.string());
 }
 
 }  // namespace

@@ -1,7 +1,9 @@
 #include "viewer/command/terminal/progress_display.h"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
+#include <utility>
 
 #include <fmt/format.h>
 #include <sys/ioctl.h>
@@ -21,6 +23,10 @@ int terminalColumns(std::FILE* out) {
     return size.ws_col;
 }
 
+double steadySeconds() {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
 // Progress that stands still is shown again after so long, with its new counts.
 constexpr double kJsonSeconds = 2, kPlainSeconds = 30, kBarSeconds = 0.5;
 
@@ -36,11 +42,14 @@ std::optional<ProgressStyle> progressStyleNamed(std::string_view name) {
 
 ProgressStyle defaultProgressStyle() { return isatty(STDERR_FILENO) ? ProgressStyle::Bar : ProgressStyle::None; }
 
+ProgressDisplay::ProgressDisplay(ProgressStyle style, std::FILE* out, std::function<double()> clock)
+    : style_(style), out_(out), clock_(clock ? std::move(clock) : steadySeconds), start_(clock_()) {}
+
 void ProgressDisplay::update(std::string_view stage, double fraction, const ProgressDetails& details) {
     if (style_ == ProgressStyle::None) return;
     fraction = std::clamp(fraction, 0.0, 1.0);
     const double elapsed = seconds();
-    const std::optional<double> left = secondsLeft(elapsed, fraction);
+    const std::optional<double> left = secondsLeft(elapsed, fraction, details.begun);
     std::string facts;
     if (details.triangles > 0) facts += fmt::format(", {} triangles", formatCount(details.triangles));
     if (details.tempBytes > 0) facts += fmt::format(", {} temporary", formatBytes(details.tempBytes));
@@ -60,7 +69,8 @@ void ProgressDisplay::update(std::string_view stage, double fraction, const Prog
         if (left) json["seconds_left"] = *left;
         if (details.triangles > 0) {
             json["triangles"] = details.triangles;
-            json["triangles_per_second"] = fraction * double(details.triangles) / std::max(elapsed, 1e-9);
+            json["triangles_per_second"] =
+                (fraction - details.begun) * double(details.triangles) / std::max(elapsed, 1e-9);
             json["temp_bytes"] = details.tempBytes;
         }
         line = terminalJson(json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace));

@@ -3,9 +3,9 @@
 // Used by one thread. finish() and the destructor erase the bar, so that an error line after it stands alone.
 #pragma once
 
-#include <chrono>
 #include <cstdint>
 #include <cstdio>
+#include <functional>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -30,11 +30,13 @@ ProgressStyle defaultProgressStyle();
 struct ProgressDetails {
     uint64_t triangles = 0;  ///< triangles read so far; 0: not shown
     uint64_t tempBytes = 0;
+    double begun = 0;  ///< fraction that was done when this run began: time and speed are of what came after it
 };
 
 class ProgressDisplay {
 public:
-    ProgressDisplay(ProgressStyle style, std::FILE* out) : style_(style), out_(out) {}
+    /// `clock`: seconds since any moment; the system's where it is empty.
+    ProgressDisplay(ProgressStyle style, std::FILE* out, std::function<double()> clock = {});
     ProgressDisplay(const ProgressDisplay&) = delete;
     ProgressDisplay& operator=(const ProgressDisplay&) = delete;
     ~ProgressDisplay() { finish(); }
@@ -46,13 +48,12 @@ public:
 
 private:
     void drawBar(std::string_view stage, double fraction, const std::string& facts);
-    [[nodiscard]] double seconds() const {
-        return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
-    }
+    [[nodiscard]] double seconds() const { return clock_() - start_; }
 
     ProgressStyle style_;
     std::FILE* out_;
-    std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+    std::function<double()> clock_;
+    double start_;
     std::string lastStage_;
     std::string lastBar_;
     int lastStep_ = -1;

@@ -66,6 +66,34 @@ TEST(ProgressDisplay, JsonIsAnObjectALine) {
     EXPECT_EQ(nlohmann::json::parse(lines.front())["stage"], "reading \"x\"");
 }
 
+TEST(ProgressDisplay, WhatIsLeftIsCountedFromWhereTheRunBegan) {
+    char* text = nullptr;
+    size_t size = 0;
+    std::FILE* out = open_memstream(&text, &size);
+    double now = 1000;
+    {
+        ProgressDisplay display(ProgressStyle::Json, out, [&] { return now; });
+        const ProgressDetails resumed{.triangles = 1000000, .tempBytes = 1, .begun = 0.5};
+        now = 1004;
+        display.update("level 1", 0.5, resumed);
+        now = 1010;
+        display.update("level 1", 0.6, resumed);
+        now = 1040;
+        display.update("level 1", 0.9, resumed);
+        display.update("anew", 0.8);
+    }
+    std::fclose(out);
+    const auto lines = linesOf(text);
+    std::free(text);
+    ASSERT_EQ(lines.size(), 4u);
+    EXPECT_FALSE(nlohmann::json::parse(lines[0]).contains("seconds_left")) << "nothing was done in this run";
+    const auto early = nlohmann::json::parse(lines[1]), late = nlohmann::json::parse(lines[2]);
+    EXPECT_NEAR(early["seconds_left"].get<double>(), 40, 1e-9) << "a tenth of the whole took 10 s";
+    EXPECT_NEAR(late["seconds_left"].get<double>(), 10, 1e-9);
+    EXPECT_NEAR(late["triangles_per_second"].get<double>(), 10000, 1e-6);
+    EXPECT_NEAR(nlohmann::json::parse(lines[3])["seconds_left"].get<double>(), 10, 1e-9) << "0.8 took 40 s";
+}
+
 TEST(ProgressDisplay, BarStaysOnItsLineAndCleansUp) {
     const std::string text = written(ProgressStyle::Bar);
     EXPECT_EQ(text.find('\n'), std::string::npos);
