@@ -122,6 +122,7 @@ void Builder::finishReport() {
     report_.peakRssBytes = peakRssBytes();
     report_.tempBytes = space_.peakDiskBytes();
     report_.seconds = meter_.seconds();
+    report_.isResumed = meter_.wasBegun();
 }
 
 std::filesystem::path tempFolderOf(const BuildOptions& options) {

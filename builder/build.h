@@ -117,6 +117,7 @@ struct BuildFigures {
 };
 
 struct BuildReport : BuildFigures {
+    bool isResumed = false;             ///< seconds are those since then
     uint64_t cutTriangles = 0;          ///< triangles of the inputs that masks cut, or cut out
     std::vector<std::string> warnings;  ///< one line for each thing that was left out of the inputs
     std::vector<SideFile> sideFiles;    ///< files that the inputs name, each once

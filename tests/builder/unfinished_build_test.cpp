@@ -155,6 +155,7 @@ TEST_F(UnfinishedBuild, ProgressGoesOnFromWhereItWas) {
         o.progress = [&](const BuildProgress& now) { return told.push_back(now), true; };
         const auto report = buildOctree(o);
         ASSERT_TRUE(report) << report.error().line();
+        EXPECT_TRUE(report->isResumed) << stage;
         ASSERT_GE(told.size(), 2u) << stage;
         EXPECT_GT(told.front().begun, last) << stage << ": more was done than where it was stopped before";
         EXPECT_LT(told.front().begun, 1) << stage;

@@ -38,9 +38,12 @@ struct BuildCommand {
 
 std::string summary(const std::string& output, const BuildReport& report) {
     const double triangles = double(std::max<uint64_t>(report.triangles, 1));
-    std::string text = fmt::format("{}: {} in {} ({:.2f} M/s), peak memory {}\n", output,
-                                   formatCount(report.triangles, "triangle"), formatSeconds(report.seconds),
-                                   1e-6 * triangles / std::max(report.seconds, 1e-9), formatBytes(report.peakRssBytes));
+    const std::string rate = report.isResumed
+                                 ? "since it was resumed"
+                                 : fmt::format("({:.2f} M/s)", 1e-6 * triangles / std::max(report.seconds, 1e-9));
+    std::string text =
+        fmt::format("{}: {} in {} {}, peak memory {}\n", output, formatCount(report.triangles, "triangle"),
+                    formatSeconds(report.seconds), rate, formatBytes(report.peakRssBytes));
     if (report.degenerateTriangles > 0)
         text += fmt::format("  left out: {} without area\n", formatCount(report.degenerateTriangles, "triangle"));
     if (report.cutTriangles > 0)
