@@ -23,7 +23,7 @@ int MovingSize::next(bool isNew) {
     const auto known = fullMs_.begin() + long(std::min(frames_, kRemembered));
     const int wanted = reductionFor(*std::min_element(fullMs_.begin(), known), frameMs_);
     if (wanted > reduction_) {
-        if (std::exchange(hasTried_, false)) patience_ *= 2;
+        if (std::exchange(hasTried_, false)) patience_ *= 3;
         reduction_ = wanted;
     } else if (calm_ >= patience_) {
         hasTried_ = true;

@@ -7,8 +7,8 @@
 namespace vcp {
 
 /// Decides from frame to frame by how much the width and the height of moving pictures are reduced. A slow frame by
-/// itself changes nothing; pictures become smaller where three in a row were too slow, and larger where many in a row
-/// left room. Where that was in vain, the next attempt waits twice as long: sizes must not flicker.
+/// itself changes nothing; pictures become smaller where three in a row were too slow, and larger where that may do
+/// after many in a row. Where that was in vain, the next attempt waits three times as long: sizes must not flicker.
 class MovingSize {
 public:
     static constexpr int kMost = 8;
@@ -27,8 +27,8 @@ public:
 
 private:
     static constexpr size_t kRemembered = 3;
-    static constexpr int kPatience = 6;
-    static constexpr double kRoom = 0.7;  // of the time, that a larger picture may take
+    static constexpr int kPatience = 10;
+    static constexpr double kRoom = 1.2;  // of the time, that a larger picture may seem to take: it takes less
 
     [[nodiscard]] int reductionFor(double fullMs, double frameMs) const;
 
@@ -36,7 +36,7 @@ private:
     std::array<double, kRemembered> fullMs_{};  // of the last frames
     size_t frames_ = 0;
     int reduction_ = 1;
-    int calm_ = 0;              // frames in a row that left room
+    int calm_ = 0;              // frames in a row after which a larger one may do
     int patience_ = kPatience;  // so many make pictures larger
     bool hasTried_ = false;     // pictures were made larger last
 };

@@ -1,6 +1,7 @@
 // Sizes of moving pictures, with frames that take what a model says.
 #include "viewer/moving_size.h"
 
+#include <algorithm>
 #include <functional>
 #include <vector>
 
@@ -35,7 +36,9 @@ TEST(MovingSize, IsTheLargestThatTheTimeAllowsFromTheFirstFrameOn) {
     for (const auto& [fullMs, reduction] : {std::pair(40.0, 1), {60.0, 2}, {199.0, 2}, {201.0, 3}, {1e6, 8}}) {
         MovingSize size(50);
         size.take(1, fullMs);
-        EXPECT_EQ(motion(size, 100, frameOf(fullMs)), std::vector<int>(100, reduction)) << fullMs;
+        const std::vector<int> sizes = motion(size, 100, frameOf(fullMs));
+        EXPECT_EQ(sizes.front(), reduction) << fullMs;
+        EXPECT_GE(std::count(sizes.begin(), sizes.end(), reduction), 90) << fullMs;
     }
     MovingSize never(0);
     never.take(1, 1e6);
@@ -57,17 +60,18 @@ TEST(MovingSize, WhatWasSlowForAWhileIsLargeAgain) {
     // Other programs take the processors, and what a frame takes whatever its size makes small ones look worse.
     const std::vector<int> busy = motion(size, 30, frameOf(400, 8));
     EXPECT_GE(busy.back(), 3);
-    const std::vector<int> idle = motion(size, 200, frameOf(20, 2));
+    const std::vector<int> idle = motion(size, 200, frameOf(30, 2));
     EXPECT_EQ(idle.back(), 1);
+    EXPECT_LE(std::count(idle.begin(), idle.end(), 1), 200 - 10 * (busy.back() - 1));
     EXPECT_LE(changes(idle), busy.back()) << "step by step";
 }
 
 TEST(MovingSize, DoesNotFlicker) {
-    // Too slow at full size, and at half of it the estimate leaves room.
+    // Too slow at full size, which seems to do at half of it.
     const auto deceiving = [](int, int reduction) { return reduction == 1 ? 80.0 : 8.0; };
     MovingSize size(50);
     size.take(1, 80);
-    EXPECT_LE(changes(motion(size, 2000, deceiving)), 16);
+    EXPECT_LE(changes(motion(size, 2000, deceiving)), 12);
 }
 
 TEST(MovingSize, AViewThatHoldsStillKeepsItsSizeAndANewMotionBeginsAnew) {
