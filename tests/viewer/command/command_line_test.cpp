@@ -880,7 +880,7 @@ TEST_F(CommandLine, ATurntableIsAVideoOfItsPictures) {
 
 TEST_F(CommandLine, ViewWithoutADisplayPointsToRender) {
     expectFailure(run({"view", dataset().string()}), 1, "vcp render");
-    expectFailure(run({"view", dataset().string(), ball().string()}), 2, "a scene file");
+    expectFailure(run({"view", dataset().string(), ball().string()}), 1, "vcp render");
     const fs::path scene = *folder_ / "wrong_scene.json";
     write(scene, "{\n\"datasets\": [{\"file\": \"none.vcp\", \"scale\": 0}]}");
     expectFailure(run({"view", scene.string()}), 1, scene.string() + ": line 2: \"scale\"");
