@@ -217,7 +217,7 @@ Result<std::vector<std::unique_ptr<PartPages>>> openPages(const PartContext& con
     std::atomic<unsigned> opened = 0;
     const auto open = [&](size_t k) -> Result<void> {
         VCP_TRY_ASSIGN(auto done, context.open("pages", unsigned(k)));
-        auto part = std::make_unique<PartPages>(std::move(done));
+        auto part = std::make_unique<PartPages>(PartPages{.done = std::move(done), .pages = {}, .kept = {}});
         part->pages = makeSpools(*part->done.space, levels, "");
         part->kept = makeSpools(*part->done.space, levels, "kept");
         VCP_TRY(openSpools(part->done, "pages", part->pages));

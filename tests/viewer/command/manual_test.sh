@@ -24,7 +24,7 @@ helpOf() {
 optionsOf() {
     local -a words
     read -ra words <<<"$1"
-    "$vcp" "${words[@]:1}" --help-all | sed -n 's/^  \(-[^ ]*\).*/\1/p' | sed 's/{[^}]*}//g' | tr ',' '\n' | sort -u
+    "$vcp" "${words[@]:1}" --help-all | sed -n 's/^  \(-[^ ]*\).*/\1/p' | sed 's/{[^}]*}//g; s/\[=[^]]*\]//g' | tr ',' '\n' | sort -u
 }
 
 # commandsOf PATH: it, and the commands that its help lists, and theirs.
@@ -48,7 +48,7 @@ for path in "${paths[@]}"; do
     page=pages/${path// /-}.1
     [ -s "$page" ] || fail "there is no $page"
     # Names begin a line or follow a comma.
-    named=$(sed 's/\\fB\|\\fI\|\\fR//g; s/\\-/-/g; s/, /\n/g' "$page" | sed 's/[, ].*//' | sort -u)
+    named=$(sed 's/\\fB\|\\fI\|\\fR//g; s/\\-/-/g; s/, /\n/g' "$page" | sed 's/[[, ].*//' | sort -u)
     missing=$(comm -23 <(echo "${options[$path]}") <(echo "$named"))
     [ -z "$missing" ] || fail "$page does not name $missing"
 done

@@ -126,7 +126,8 @@ std::string zshValue(const OptionEntry& option) {
                          : option.kind == ValueKind::Folder ? "_files -/"
                                                             : "";
     if (!option.words.empty()) action = fmt::format("({})", fmt::join(option.words, " "));
-    return fmt::format(":{}:{}", zshText(option.value.empty() ? "value" : option.value), action);
+    return fmt::format(":{}:{}",
+                       zshText(option.value.empty() || option.value.starts_with('[') ? "value" : option.value), action);
 }
 
 std::string zshFunctionName(const CommandEntry& command) {

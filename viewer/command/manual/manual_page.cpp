@@ -45,11 +45,12 @@ std::string upper(std::string text) {
 std::string bold(const std::string& text) { return "\\fB" + roff(text) + "\\fR"; }
 std::string italic(const std::string& text) { return "\\fI" + roff(text) + "\\fR"; }
 
-/// Returns "--method certified|paper", and so on.
+/// Returns "--method certified|paper", "--caps[=all]", and so on.
 std::string heading(const OptionEntry& option) {
     std::string text;
     for (const std::string& name : option.names) text += (text.empty() ? "" : ", ") + bold(name);
-    if (!option.value.empty()) text += (text.empty() ? "" : " ") + italic(option.value);
+    const bool isApart = !text.empty() && !option.value.starts_with('[');
+    if (!option.value.empty()) text += (isApart ? " " : "") + italic(option.value);
     return text;
 }
 
