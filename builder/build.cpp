@@ -122,7 +122,7 @@ void Builder::finishReport() {
     report_.peakRssBytes = peakRssBytes();
     report_.tempBytes = space_.peakDiskBytes();
     report_.seconds = meter_.seconds();
-    report_.isResumed = meter_.wasBegun();
+    report_.isResumed = isResumed_;
 }
 
 std::filesystem::path tempFolderOf(const BuildOptions& options) {

@@ -41,9 +41,7 @@ void Builder::openPass() {
 LevelSettings Builder::settingsOf(int level) {
     LevelSettings settings = plan_.settingsOf(level, pass_ + 1 == plan_.levels());
     settings.withColour = hasColour();
-    settings.codesSurface = space_.diskBytes() > 0 || !space_.isAmple(0);
-    settings.roomBytes = memory_.tempBytes;
-    settings.makeRoom = [this] { return space_.spill(); };
+    settings.buildBeside(space_, memory_.tempBytes);
     return settings;
 }
 

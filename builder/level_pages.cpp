@@ -144,6 +144,12 @@ std::vector<PageWork> workOfPages(const LevelSettings& settings, const LatticeMe
 
 }  // namespace
 
+void LevelSettings::buildBeside(TempSpace& space, uint64_t tempBytes) {
+    codesSurface = space.diskBytes() > 0 || !space.isAmple(0);
+    roomBytes = tempBytes;
+    makeRoom = [&space] { return space.spill(); };
+}
+
 Result<BuiltPage> builtPage(const LevelSettings& settings, uint64_t code, const EncodedPage& encoded) {
     BuiltPage page;
     page.entry.morton = code;

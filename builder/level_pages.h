@@ -24,6 +24,9 @@ struct LevelSettings {
     uint64_t pageBytes = 0;     ///< memory for the mesh and pages under construction
     uint64_t roomBytes = 0;     ///< memory that makeRoom frees besides, for a page that is built alone
     std::function<Result<void>()> makeRoom;
+
+    /// Has pages built beside the temporary files of `space`, which may have so much in memory. It outlives this.
+    void buildBeside(TempSpace& space, uint64_t tempBytes);
 };
 
 /// Returns a page of the level at a Morton code, coded, with its entry; without its surface. Errors: InvalidInput (it

@@ -20,8 +20,6 @@ public:
     /// Says that so much of the build was done before this run; before the first report.
     void beginAt(double fraction) { begun_ = fraction_ = fraction; }
 
-    [[nodiscard]] bool wasBegun() const { return begun_ > 0; }
-
     /// `now`: stage, time and where the run began are filled in here. Returns false once the callback has cancelled.
     bool report(const std::string& stage, BuildProgress now) {
         if (!callback_) return true;

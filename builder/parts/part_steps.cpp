@@ -299,10 +299,7 @@ uint64_t PartContext::firstCode(unsigned part) const {
 LevelSettings PartContext::settingsOf(int level, bool isFinest, TempSpace& space) const {
     LevelSettings settings = levels.settingsOf(level, isFinest);
     settings.withColour = hasColour;
-    // Few are kept, and these are coded then.
-    settings.codesSurface = space.diskBytes() > 0 || !space.isAmple(0);
-    settings.roomBytes = memory.tempBytes;
-    settings.makeRoom = [&space] { return space.spill(); };
+    settings.buildBeside(space, memory.tempBytes);
     return settings;
 }
 

@@ -74,13 +74,13 @@ private:
                                     .node = at.word,
                                     .corners = {corners[0][t], corners[1][t], corners[2][t]},
                                     .flat = {flat[0][t], flat[1][t], flat[2][t]}});
-            isOnTriangles_ = true;
         }
         takeTriangle(triangles, t, group, taken, in);
     }
 
     void writeHits() {
-        if (isOnTriangles_) normals_.find(scene_, hits_.leaves);
+        const auto isOnTriangles = [](const RayGroup& group) HWY_ATTR { return any(group.onTriangle); };
+        if (std::any_of(groups_, groups_ + kGroups, isOnTriangles)) normals_.find(scene_, hits_.leaves);
         // The edge of a cell in two parts, so that depths are rounded once.
         const Lane cell{float(scene_.grid().cell)}, rest{scene_.grid().cell - double(float(scene_.grid().cell))};
         for (int i = 0; i < kGroups; ++i) {
@@ -126,7 +126,6 @@ private:
 
     TileHits& hits_;
     TriangleNormals normals_;
-    bool isOnTriangles_ = false;  // some hits are
 };
 
 }  // namespace vcp::HWY_NAMESPACE

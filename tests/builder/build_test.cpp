@@ -4,14 +4,11 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <csignal>
 #include <cstring>
 #include <fstream>
 #include <numeric>
 #include <random>
 #include <set>
-
-#include <sys/resource.h>
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -20,6 +17,7 @@
 #include "octree/reference_caster.h"
 #include "octree/surface/packing.h"
 #include "octree/vcp_verify.h"
+#include "tests/support/file_size_limit.h"
 #include "tests/support/mesh_files.h"
 #include "tests/support/test_folder.h"
 #include "tests/support/test_meshes.h"
@@ -740,21 +738,17 @@ TEST_F(Build, FullDisk) {
     const fs::path input = ply(scene());
     ASSERT_TRUE(buildOctree(options({input}, "whole.vcp")).ok());
     const auto size = fs::file_size(folder_ / "whole.vcp");
-    rlimit before{};
-    getrlimit(RLIMIT_FSIZE, &before);
-    auto* const handler = std::signal(SIGXFSZ, SIG_IGN);
     // In the directory, among the pages, and just before the commit record.
-    for (const rlim_t limit : {rlim_t{4200}, rlim_t{size / 2}, rlim_t{size - 1}}) {
-        const rlimit small{limit, before.rlim_max};
-        setrlimit(RLIMIT_FSIZE, &small);
-        const auto report = buildOctree(options({input}));
-        setrlimit(RLIMIT_FSIZE, &before);
+    for (const uint64_t limit : {uint64_t{4200}, uint64_t{size / 2}, uint64_t{size - 1}}) {
+        const auto report = [&] {
+            const test::FileSizeLimit full(limit);
+            return buildOctree(options({input}));
+        }();
         ASSERT_FALSE(report.ok()) << limit;
         EXPECT_EQ(report.error().code, ErrorCode::Io);
         EXPECT_NE(report.error().line().find("out.vcp: write failed"), std::string::npos) << report.error().line();
         expectNothingLeft();
     }
-    std::signal(SIGXFSZ, handler);
 }
 
 TEST_F(Build, WrongOutputsAreFoundFirst) {

@@ -3,9 +3,9 @@
 
 #include <atomic>
 #include <cmath>
-#include <csignal>
 #include <cstring>
 #include <limits>
+#include <optional>
 #include <random>
 #include <thread>
 
@@ -21,6 +21,7 @@
 #include "octree/vcp_verify.h"
 #include "octree/vcp_writer.h"
 #include "tests/support/analytic_page.h"
+#include "tests/support/file_size_limit.h"
 #include "tests/support/peak_memory.h"
 #include "tests/support/test_folder.h"
 
@@ -969,19 +970,10 @@ public:
     explicit SmallDisk(const fs::path& folder) : folder_(folder) {
         fs::create_directory(folder);
         mounted_ = mount("tmpfs", folder.c_str(), "tmpfs", 0, "size=64k") == 0;
-        if (mounted_) return;
-        getrlimit(RLIMIT_FSIZE, &before_);
-        handler_ = std::signal(SIGXFSZ, SIG_IGN);
-        const rlimit small{64 << 10, before_.rlim_max};
-        setrlimit(RLIMIT_FSIZE, &small);
+        if (!mounted_) limit_.emplace(64 << 10);
     }
     ~SmallDisk() {
-        if (mounted_) {
-            umount(folder_.c_str());
-        } else {
-            setrlimit(RLIMIT_FSIZE, &before_);
-            std::signal(SIGXFSZ, handler_);
-        }
+        if (mounted_) umount(folder_.c_str());
     }
     SmallDisk(const SmallDisk&) = delete;
     SmallDisk& operator=(const SmallDisk&) = delete;
@@ -990,8 +982,7 @@ public:
 private:
     fs::path folder_;
     bool mounted_ = false;
-    rlimit before_{};
-    void (*handler_)(int) = nullptr;
+    std::optional<test::FileSizeLimit> limit_;
 };
 
 TEST_F(VcpFile, FullDisk) {

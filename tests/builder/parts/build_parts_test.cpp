@@ -1,18 +1,19 @@
 // Builds in parts: the bytes of a whole build, whatever the order; parts that are lost, cut off, killed or foreign.
 #include "builder/parts/part_dealing.h"
 
-#include <sys/resource.h>
 #include <algorithm>
-#include <csignal>
 #include <fstream>
 #include <iterator>
 #include <random>
 #include <thread>
 #include <utility>
 
+#include <sys/resource.h>
+
 #include <gtest/gtest.h>
 
 #include "builder/parts/build_parts.h"
+#include "tests/support/file_size_limit.h"
 #include "tests/support/mesh_files.h"
 #include "tests/support/test_folder.h"
 #include "tests/support/test_meshes.h"
@@ -169,20 +170,16 @@ TEST_F(BuildParts, AMergeThatEndsEarlyLeavesNothing) {
         EXPECT_EQ(done.error().code, ErrorCode::Cancelled) << done.error().line();
         expectNothing();
     }
-    rlimit before{};
-    getrlimit(RLIMIT_FSIZE, &before);
-    auto* const handler = std::signal(SIGXFSZ, SIG_IGN);
-    for (const rlim_t limit : {rlim_t{4200}, rlim_t{whole_.size() / 2}, rlim_t{whole_.size() - 1}}) {
-        const rlimit small{limit, before.rlim_max};
-        setrlimit(RLIMIT_FSIZE, &small);
-        const auto full = run("merge", 0);
-        setrlimit(RLIMIT_FSIZE, &before);
+    for (const size_t limit : {size_t{4200}, whole_.size() / 2, whole_.size() - 1}) {
+        const auto full = [&] {
+            const test::FileSizeLimit disk(limit);
+            return run("merge", 0);
+        }();
         ASSERT_FALSE(full.ok()) << limit;
         EXPECT_EQ(full.error().code, ErrorCode::Io);
         EXPECT_NE(full.error().line().find("out.vcp: write failed"), std::string::npos) << full.error().line();
         expectNothing();
     }
-    std::signal(SIGXFSZ, handler);
     ASSERT_TRUE(run("merge", 0).ok());
     EXPECT_EQ(bytesOf(output()), whole_);
 }

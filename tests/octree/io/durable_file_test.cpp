@@ -12,9 +12,9 @@
 
 #include <fcntl.h>
 #include <gtest/gtest.h>
-#include <sys/resource.h>
 #include <unistd.h>
 
+#include "tests/support/file_size_limit.h"
 #include "tests/support/random_bytes.h"
 #include "tests/support/test_folder.h"
 
@@ -63,16 +63,12 @@ TEST_F(DurableFile, WritesWhereItIsTold) {
 
 // Part of the bytes still fit: they are written, and then it is an error.
 TEST_F(DurableFile, PartialWritesGoOnToTheEndOrTheError) {
-    std::signal(SIGXFSZ, SIG_IGN);
-    rlimit before{};
-    ASSERT_EQ(getrlimit(RLIMIT_FSIZE, &before), 0);
-    const rlimit small{4096, before.rlim_max};
     const Bytes bytes = test::randomBytes(5000, 2);
     const Opened fd(file_, O_RDWR | O_CREAT);
-    ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &small), 0);
-    const auto result = writeAll(fd, 0, bytes, file_);
-    ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &before), 0);
-    std::signal(SIGXFSZ, SIG_DFL);
+    const auto result = [&] {
+        const test::FileSizeLimit limit(4096);
+        return writeAll(fd, 0, bytes, file_);
+    }();
     ASSERT_FALSE(result.ok());
     EXPECT_EQ(result.error().code, ErrorCode::Io);
     EXPECT_EQ(result.error().line(), file_.string() + ": write failed: File too large");
