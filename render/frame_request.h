@@ -41,8 +41,8 @@ struct SectionPlane {
 };
 /// A request has at most so many planes (kMaxSections in frame_layout.h).
 constexpr size_t kMostSections = 6;
-/// Rays of ambient occlusion a pixel: at most, and where it is only switched on.
-constexpr uint32_t kMostOcclusionRays = 64, kUsualOcclusionRays = 8;
+/// Rays of ambient occlusion a pixel and sample: at most, and where it is only switched on.
+constexpr uint32_t kMostOcclusionRays = 64, kUsualOcclusionRays = 3;
 /// Samples a pixel: at most, and of a picture where no number is asked for.
 constexpr uint32_t kMostSamples = 64, kUsualSamples = 16;
 

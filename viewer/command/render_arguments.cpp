@@ -105,8 +105,11 @@ void addRenderSettings(CLI::App& app, RenderSettings& settings) {
     app.add_flag("!--plain", settings.shading.channels,
                  "Plain light on all colours, where materials have normals, roughness, metalness or emission, too");
     app.add_flag("--shadows", settings.shading.shadows, "Light casts hard shadows");
-    app.add_option("--occlusion", settings.shading.occlusionRays,
-                   "Corners and folds are darker (ambient occlusion), by so many rays a pixel; 8 without N [off]")
+    app.add_option(
+           "--occlusion", settings.shading.occlusionRays,
+           fmt::format("Corners and folds are darker (ambient occlusion), by so many rays a pixel and sample; {} "
+                       "without N [off]",
+                       kUsualOcclusionRays))
         ->type_name("N")
         ->expected(0, 1)
         ->default_str(std::to_string(kUsualOcclusionRays))

@@ -5,7 +5,7 @@ import { kMarkup, kStyle } from './markup.js';
 const kModes = { lit: 0, clay: 1, unlit: 2, normals: 3, level: 7, error: 8, wireframe: 9 };
 const kEnvironments = ['studio', 'overcast', 'clear'];
 const kMovingScale = 0.4; // of the resolution, while the view moves for the first time
-const kOcclusionRays = 8; // a pixel
+const kOcclusionRays = 3; // a pixel and sample
 const kRestMs = 160; // without a movement: the view is at rest
 const kSaidMs = 4000; // a line that answers a button stands as long
 const kTapMs = 300, kTapPixels = 24; // two taps so near each other are one double tap

@@ -1104,9 +1104,9 @@ TEST_F(CommandLine, OptionsThatMayStandAloneTakeNoFileForTheirValue) {
     const std::string usual = draw({file, "--occlusion"}), plain = draw({file});
     EXPECT_NE(usual, plain);
     EXPECT_EQ(draw({"--occlusion", file}), usual);
-    EXPECT_EQ(draw({"--occlusion=8", file}), usual);
-    EXPECT_EQ(draw({"--occlusion", "8", file}), usual);
-    EXPECT_EQ(draw({file, "--occlusion", "--shadows"}), draw({"--shadows", "--occlusion", "8", file}));
+    EXPECT_EQ(draw({"--occlusion=3", file}), usual);
+    EXPECT_EQ(draw({"--occlusion", "3", file}), usual);
+    EXPECT_EQ(draw({file, "--occlusion", "--shadows"}), draw({"--shadows", "--occlusion", "3", file}));
     EXPECT_EQ(draw({"--occlusion", "0", file}), plain);
     const std::string cut = draw({file, "--section", "x<50%", "--section", "y<50%"});
     EXPECT_NE(cut, plain);
