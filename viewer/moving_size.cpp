@@ -35,6 +35,11 @@ int MovingSize::next(bool isNew) {
     return reduction_;
 }
 
+bool MovingOcclusion::keeps() const {
+    const auto known = fullMs_.begin() + long(std::min(frames_, kRemembered));
+    return std::any_of(fullMs_.begin(), known, [this](double ms) { return ms <= mostMs_; });
+}
+
 int MovingSize::reductionFor(double fullMs, double frameMs) const {
     return int(std::clamp(std::ceil(std::sqrt(fullMs / frameMs)), 1.0, double(kMost)));
 }

@@ -1,4 +1,4 @@
-// How large pictures are while the camera moves: as large as a frame's time allows.
+// What pictures are like while the camera moves: as large, and with as much light, as a frame's time allows.
 #pragma once
 
 #include <array>
@@ -39,6 +39,27 @@ private:
     int calm_ = 0;              // frames in a row after which a larger one may do
     int patience_ = kPatience;  // so many make pictures larger
     bool hasTried_ = false;     // pictures were made larger last
+};
+
+/// Decides whether moving pictures keep ambient occlusion: where pictures with it, at rest and in motion, take no more
+/// than a part of a frame's time. One that is slow by itself changes nothing. Where motion has lost it, it comes back
+/// at rest.
+class MovingOcclusion {
+public:
+    /// `frameMs`: what a frame may take; 0: moving pictures have no occlusion.
+    explicit MovingOcclusion(double frameMs) : mostMs_(kPart * frameMs) {}
+
+    /// Takes in a frame with occlusion. `fullMs`: as in MovingSize::take.
+    void take(double fullMs) { fullMs_[frames_++ % kRemembered] = fullMs; }
+    [[nodiscard]] bool keeps() const;
+
+private:
+    static constexpr size_t kRemembered = 3;
+    static constexpr double kPart = 0.6;
+
+    double mostMs_;
+    std::array<double, kRemembered> fullMs_{};  // of the last frames with occlusion
+    size_t frames_ = 0;
 };
 
 }  // namespace vcp

@@ -109,7 +109,8 @@ Viewer::Viewer(const ViewerOptions& options, std::unique_ptr<Renderer> renderer)
       shading_(options.shading),
       sections_(options.sections),
       sectionCaps_(options.sectionCaps),
-      movingSize_(options.movingFrameMs) {
+      movingSize_(options.movingFrameMs),
+      movingOcclusion_(options.movingFrameMs) {
     status_.device = renderer_->device().name;
     status_.software = renderer_->device().software;
     status_.budgetBytes = options.renderer.budgetBytes;
@@ -503,9 +504,9 @@ FrameRequest Viewer::requestWith(int reduction) const {
     request.shading = shading_;
     request.colourError = colourErrorIn(shading_.mode, options_.colourError);
     if (request.shading.environment) request.shading.environment->up = directionOf(camera_.up);
-    // The first pictures of a scene come without, as moving ones do, so that there is something to look at.
+    // The first pictures of a scene come without, so that there is something to look at.
     const bool isFirst = options_.framesAhead && isOpen_ && !hasSettled_;
-    if (isMoving(now_) || isFirst) request.shading.occlusionRays = 0;
+    if ((isMoving(now_) && !movingOcclusion_.keeps()) || isFirst) request.shading.occlusionRays = 0;
     request.sections = sections_;
     request.sectionCaps = sectionCaps_;
     request.march = options_.march;
@@ -657,13 +658,16 @@ void Viewer::finishDraw() {
 void Viewer::takeStats(const DoneFrame& done) {
     status_.frame = done.stats;
     status_.device = castBy(renderer_->device(), done.stats.onHost);
-    // The first frame also compiles: it says nothing about the next. Moving ones have no occlusion; what that took of
-    // this frame is known of a device's only.
+    // The first frame also compiles: it says nothing about the next.
+    if (done.number == 1) return;
+    const double toFull = double(size_.x) * size_.y / double(done.stats.rays);
     const bool hasOcclusion = done.request.shading.occlusionRays > 0;
-    if (done.number == 1 || (hasOcclusion && done.stats.onHost)) return;
+    if (hasOcclusion) movingOcclusion_.take(toFull * done.stats.msFrame);
+    // What occlusion took of a frame is known of a device's only.
+    if (hasOcclusion && done.stats.onHost) return;
     const double light = hasOcclusion ? done.stats.msLight : 0;
-    const double fullMs = double(size_.x) * size_.y / double(done.stats.rays) * (done.stats.msFrame - light);
-    movingSize_.take(std::max(1, int(std::lround(double(size_.x) / done.request.width))), fullMs);
+    movingSize_.take(std::max(1, int(std::lround(double(size_.x) / done.request.width))),
+                     toFull * (done.stats.msFrame - light));
 }
 
 }  // namespace vcp

@@ -51,7 +51,7 @@ enum class ViewerAction {
     Reset,        ///< goes to the camera the dataset opened with
     ToggleLight,  ///< lets the light follow the camera, or stay where it is in the world
     ToggleShadows,
-    ToggleOcclusion,   ///< ambient occlusion; left out while the camera moves
+    ToggleOcclusion,   ///< ambient occlusion; left out of moving pictures where it takes long
     ToggleSection,     ///< cuts through the middle, away from the viewer, with caps; or removes all section planes
     NextShading,       ///< lit, unlit, clay, normals, steps, cells, fetches, level, error, wireframe
     ToggleProjection,  ///< perspective or orthographic, same size at the point of interest
@@ -73,7 +73,7 @@ struct ViewerOptions {
     std::vector<SectionPlane> sections;
     Caps sectionCaps = Caps::None;
     PaperMarch march;  ///< march through datasets of the method `paper`
-    /// While the camera moves, frames that would take longer are drawn smaller. 0: never.
+    /// While the camera moves, frames that would take longer are drawn smaller. 0: never, and without occlusion.
     double movingFrameMs = 50;
     double moveSeconds = 0.3;  ///< time that a smooth move takes; 0: at once
     uint32_t samples = 1;      ///< of a picture at rest (samplesOf in render/pixel_samples.h)
@@ -325,6 +325,7 @@ private:
     double drawnAt_ = -std::numeric_limits<double>::infinity();
     double now_ = 0;
     MovingSize movingSize_;
+    MovingOcclusion movingOcclusion_;
     bool pagesChanged_ = false;
     bool hasSettled_ = false;              // since a scene was opened
     bool addsSample_ = false;              // the next draw does

@@ -86,5 +86,22 @@ TEST(MovingSize, AViewThatHoldsStillKeepsItsSizeAndANewMotionBeginsAnew) {
     EXPECT_EQ(size.next(true), 1);
 }
 
+TEST(MovingOcclusion, StaysWhereFramesWithItAreQuick) {
+    MovingOcclusion occlusion(50);
+    EXPECT_FALSE(occlusion.keeps()) << "nothing is known yet";
+    occlusion.take(20);
+    EXPECT_TRUE(occlusion.keeps());
+    occlusion.take(900);
+    occlusion.take(900);
+    EXPECT_TRUE(occlusion.keeps()) << "slow frames that pass";
+    occlusion.take(31);
+    EXPECT_FALSE(occlusion.keeps());
+    occlusion.take(29);
+    EXPECT_TRUE(occlusion.keeps());
+    MovingOcclusion never(0);
+    never.take(1);
+    EXPECT_FALSE(never.keeps());
+}
+
 }  // namespace
 }  // namespace vcp

@@ -251,6 +251,21 @@ TEST_F(ViewerTest, OcclusionWaitsForRest) {
     EXPECT_FALSE(turn(0.1));
 }
 
+TEST_F(ViewerTest, OcclusionStaysWhereItTakesLittle) {
+    openViewer(1e9);
+    viewer_->act(ViewerAction::ToggleOcclusion);
+    settle();
+    viewer_->press(MouseButton::Left, {160, 120});
+    viewer_->move({170, 120});
+    EXPECT_TRUE(turn(0.01));
+    const Picture moving = viewer_->renderer().readPicture().value();
+    viewer_->release(MouseButton::Left);
+    EXPECT_FALSE(turn(0.5)) << "nothing is left to be drawn";
+    viewer_->act(ViewerAction::ToggleOcclusion);
+    EXPECT_TRUE(turn(0.1));
+    EXPECT_NE(viewer_->renderer().readPicture().value(), moving) << "it had occlusion";
+}
+
 // The handle of a section plane: its tip stays under the cursor, its foot where it is while the ring turns.
 TEST_F(ViewerTest, SectionIsMovedByItsArrow) {
     openViewer();

@@ -188,7 +188,7 @@ TEST_F(RememberingSessionTest, WhatHandsChangeIsRememberedAlsoAfterOptions) {
     second.open(ball());
     EXPECT_EQ(second.session->viewer().camera().up, UpAxis::Z);
     EXPECT_TRUE(second.session->viewer().shading().shadows);
-    EXPECT_EQ(second.session->viewer().shading().occlusionRays, 8u);
+    EXPECT_EQ(second.session->viewer().shading().occlusionRays, kUsualOcclusionRays);
     EXPECT_EQ(second.session->viewer().shading().backgroundTop, glm::vec3(1, 0, 0));
     EXPECT_EQ(second.session->viewer().errorPixels(), 3);
     EXPECT_EQ(second.session->viewer().status().budgetBytes, 96u << 20);
