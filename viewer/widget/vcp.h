@@ -322,7 +322,7 @@ typedef struct vcp_look {
     vcp_shading shading;
     double error_pixels;     /* certified error at which refining ends, in pixels; 0: half a pixel */
     uint32_t shadows;        /* 1: hard shadows */
-    uint32_t occlusion_rays; /* rays a pixel, at most 64; 0: no ambient occlusion */
+    uint32_t occlusion_rays; /* rays a pixel and sample, at most 64; 0: no ambient occlusion */
     double occlusion_radius; /* 0: a tenth of the diagonal */
     uint32_t light_in_world; /* 0: the light follows the camera */
     uint32_t transparent;    /* 1: the background is black with alpha 0, edges have alpha between */
