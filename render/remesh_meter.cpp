@@ -246,17 +246,32 @@ const DeviceInfo& RemeshMeter::device() const { return state_->device->info(); }
 
 Result<RemeshTimes> RemeshMeter::measure(const meso::RemeshSurface& surface, const meso::RemeshCamera& camera,
                                          const meso::RemeshOptions& options, int rounds) {
+    return timed(
+        *surface.heights,
+        [&] { return meso::makeRemeshPieces(surface, camera, options, state_->pieces, state_->pass->limits()); },
+        rounds);
+}
+
+Result<RemeshTimes> RemeshMeter::measure(meso::CertifiedCells& cells, const meso::RemeshCamera& camera,
+                                         const meso::RemeshOptions& options, int rounds) {
+    return timed(
+        *cells.patches().heights,
+        [&] { return meso::makeRemeshPieces(cells, camera, options, state_->pieces, state_->pass->limits()); }, rounds);
+}
+
+template <class Make>
+Result<RemeshTimes> RemeshMeter::timed(const meso::HeightLevels& heights, const Make& make, int rounds) {
     State& s = *state_;
-    VCP_TRY_ASSIGN(const auto levels, s.resources->words(meso::remeshLevelWords(*surface.heights)));
+    VCP_TRY_ASSIGN(const auto levels, s.resources->words(meso::remeshLevelWords(heights)));
     std::vector<double> pieces, sweeps, processor;
     for (int round = 0; round <= rounds; ++round) {
         const double start = processorMs();
-        VCP_TRY(meso::makeRemeshPieces(surface, camera, options, s.pieces, s.pass->limits()));
+        VCP_TRY(make());
         VCP_TRY(s.pass->prepare(s.swept, s.pieces, levels));
         const double prepared = processorMs();
         VCP_TRY_ASSIGN(const double ms, s.timer.timed(*s.device, [&](VkCommandBuffer commands) {
             barrierToAll(commands);
-            s.pass->record(commands, s.swept, *surface.heights, s.pieces.view);
+            s.pass->record(commands, s.swept, heights, s.pieces.view);
         }));
         if (round == 0) continue;
         pieces.push_back(prepared - start), sweeps.push_back(ms), processor.push_back(processorMs() - prepared);

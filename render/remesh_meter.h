@@ -15,6 +15,7 @@
 
 #include <glm/vec4.hpp>
 
+#include "mesostructure/remesh/certified_cells.h"
 #include "mesostructure/remesh/remesher.h"
 #include "octree/io/result.h"
 #include "render/vulkan/device_info.h"
@@ -52,6 +53,9 @@ public:
     /// One round to warm up, and `rounds`, at least 1, that count. Errors: Device; those of meso::makeRemeshPieces.
     Result<RemeshTimes> measure(const meso::RemeshSurface& surface, const meso::RemeshCamera& camera,
                                 const meso::RemeshOptions& options, int rounds);
+    /// The same with certified cells, whose choice is timed with the pieces.
+    Result<RemeshTimes> measure(meso::CertifiedCells& cells, const meso::RemeshCamera& camera,
+                                const meso::RemeshOptions& options, int rounds);
     /// Draws a view of `width` x `height` pixels. Errors: as measure(); Unsupported (no tessellator).
     Result<RemeshDrawn> draw(const meso::RemeshSurface& surface, const meso::RemeshCamera& camera,
                              const meso::RemeshOptions& options, RemeshWay way, uint32_t width, uint32_t height,
@@ -60,6 +64,8 @@ public:
 
 private:
     struct State;
+    template <class Make>
+    Result<RemeshTimes> timed(const meso::HeightLevels& heights, const Make& make, int rounds);
     explicit RemeshMeter(std::unique_ptr<State> state);
     std::unique_ptr<State> state_;
 };

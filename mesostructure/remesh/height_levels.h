@@ -1,5 +1,4 @@
-// Filter levels of a height map (Gumhold and Huettner 1999, 4): heights at the corners of ever coarser grids, and the
-// range of the map's heights in ever larger blocks, which bounds what a level may be off.
+// Filter levels of a height map (Gumhold and Huettner 1999, 4): heights at the corners of ever coarser grids.
 //
 // Heights are parts of the map's range, from 0 to 1. Level 0 is the map; a level has half the edge of the one below,
 // at least 1. Levels repeat as the map does; corner (i, j) of a level lies at the part (i, j) / size of the tile.
@@ -49,10 +48,6 @@ struct LevelFitOptions {
     int mostLevels = 32;
 };
 
-struct HeightRange {
-    float least = 0, most = 0;
-};
-
 class HeightLevels {
 public:
     /// Errors: InvalidInput (a map without texels, of another size than it says, or without a range).
@@ -70,18 +65,10 @@ public:
     /// large, by the logarithm.
     template <class Real>
     [[nodiscard]] Real height(glm::vec<2, Real> at, Real texels) const;
-    /// Returns what the map's heights range over in a box of places in tile units.
-    [[nodiscard]] HeightRange range(glm::dvec2 low, glm::dvec2 high) const;
 
 private:
-    void addRanges();
-    struct Blocks {
-        glm::ivec2 size{0};
-        std::vector<HeightRange> ranges;
-    };
     std::vector<HeightLevel> levels_;
     std::vector<LevelVolume> volumes_;
-    std::vector<Blocks> blocks_;  ///< of 2^i map cells' edge
     double rows_ = 1;
 };
 

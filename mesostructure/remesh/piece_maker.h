@@ -1,4 +1,5 @@
-// Makes the pieces of a view: culls base triangles, and halves those with edges of too many cells. For this room alone.
+// Makes the pieces of a view: culls base triangles, and halves those with edges of too many cells; or takes the patches
+// of certified cells. For this room alone.
 #pragma once
 
 #include <algorithm>
@@ -9,6 +10,7 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
+#include "mesostructure/remesh/certified_cells.h"
 #include "mesostructure/remesh/piece_sweep.h"
 
 namespace vcp::meso {
@@ -25,10 +27,23 @@ typename RemeshMath<Real>::RemeshView remeshViewOf(const RemeshCamera& camera, c
     const double focal = camera.focal / options.cell;
     return {{Real(focal), Real(camera.nearest), Real(1 / std::log1p(1 / focal)), camera.isParallel ? 1u : 0u},
             Real(options.cell / camera.focal),
-            options.access == HeightAccess::Most ? 1u : 0u};
+            uint32_t(options.access)};
 }
 
-/// `counts` get what is culled and halved.
+/// Whether all of some points, in eye space, are outside one of the planes of what is seen.
+template <size_t n>
+bool isOutsideView(const RemeshCamera& camera, const glm::dvec4& seen, const std::array<glm::dvec3, n>& points) {
+    const auto isAllBelow = [&](glm::dvec3 normal, double least) {
+        return std::ranges::all_of(points, [&](glm::dvec3 p) { return glm::dot(normal, p) < least; });
+    };
+    if (camera.isParallel)
+        return isAllBelow({1, 0, 0}, seen.x) || isAllBelow({0, 1, 0}, seen.y) || isAllBelow({-1, 0, 0}, -seen.z) ||
+               isAllBelow({0, -1, 0}, -seen.w) || isAllBelow({0, 0, 1}, 0);
+    return isAllBelow({0, 0, 1}, camera.nearest) || isAllBelow({1, 0, -seen.x}, 0) || isAllBelow({0, 1, -seen.y}, 0) ||
+           isAllBelow({-1, 0, seen.z}, 0) || isAllBelow({0, -1, seen.w}, 0);
+}
+
+/// `counts` get what is culled and halved. With `cells`, the surface is that of their patches, whose cells were chosen.
 template <class Real>
 class PieceMaker {
 public:
@@ -39,12 +54,13 @@ public:
     using Piece = RemeshPiece<Real>;
 
     PieceMaker(const RemeshSurface& surface, const RemeshCamera& camera, const RemeshOptions& options,
-               RemeshCounts& counts)
+               RemeshCounts& counts, const CertifiedCells* cells = nullptr)
         : camera_(camera),
           surface_(surface),
           options_(options),
           view_(remeshViewOf<Real>(camera, options)),
-          counts_(counts) {
+          counts_(counts),
+          cells_(cells) {
         points_.heights.from = surface.heights.get(), points_.view = view_;
     }
 
@@ -71,6 +87,11 @@ public:
                     piece.seams[k] = {true, Real2(surface_.seamUvs[seam][0]), Real2(surface_.seamUvs[seam][1])};
             }
             frame_ = frameOf(piece);
+            if (cells_ != nullptr) {
+                takeCells(piece, i);
+                VCP_TRY(add(piece, frame_));
+                continue;
+            }
             open_.push_back(piece);
             while (!open_.empty()) VCP_TRY(step(add));
         }
@@ -96,7 +117,7 @@ private:
     }
     [[nodiscard]] Real heightAt(const Real2& uv, const Real3& position, const Real3& direction, Real density) {
         const Real texels = points_.remeshTexelsAt(position, density);
-        return points_.remeshHeightAt(points_.remeshFootprint(texels), texels, uv, position, direction);
+        return points_.remeshHeightAt(points_.remeshHeightFootprint(texels), texels, uv, position, direction);
     }
     void place(Corner& corner) const {
         corner.weight = 1 / Math::remeshDepth(view_.grid, corner.position);
@@ -121,15 +142,15 @@ private:
             points[k] = glm::dvec3(piece.corners[k].position);
             points[k + 3] = points[k] + glm::dvec3(piece.corners[k].direction);
         }
-        const auto isAllBelow = [&](glm::dvec3 normal, double least) {
-            return std::ranges::all_of(points, [&](glm::dvec3 p) { return glm::dot(normal, p) < least; });
-        };
-        const glm::dvec4 seen = camera_.seen;
-        if (camera_.isParallel)
-            return isAllBelow({1, 0, 0}, seen.x) || isAllBelow({0, 1, 0}, seen.y) || isAllBelow({-1, 0, 0}, -seen.z) ||
-                   isAllBelow({0, -1, 0}, -seen.w) || isAllBelow({0, 0, 1}, 0);
-        return isAllBelow({0, 0, 1}, camera_.nearest) || isAllBelow({1, 0, -seen.x}, 0) ||
-               isAllBelow({0, 1, -seen.y}, 0) || isAllBelow({-1, 0, seen.z}, 0) || isAllBelow({0, -1, seen.w}, 0);
+        return isOutsideView(camera_, camera_.seen, points);
+    }
+
+    /// Gives a patch its cells of the map, over which nothing is in perspective.
+    void takeCells(Piece& piece, size_t patch) const {
+        const PatchCells chosen = cells_->cells(patch);
+        const auto corners = cells_->corners(patch, chosen.step);
+        for (size_t k = 0; k < 3; ++k) piece.corners[k].grid = corners[k], piece.corners[k].weight = 1;
+        piece.parts = chosen.parts;
     }
 
     /// Hands on, drops or halves the last of the open pieces.
@@ -201,6 +222,7 @@ private:
     const RemeshOptions& options_;
     const typename Math::RemeshView view_;
     RemeshCounts& counts_;
+    const CertifiedCells* cells_;
     typename PieceSweep<Real>::Sweeping points_;
     std::vector<Corner> corners_;
     std::vector<bool> isMeasured_;

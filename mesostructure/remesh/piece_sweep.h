@@ -3,8 +3,13 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <vector>
 
+#include <glm/geometric.hpp>
+
+#include "mesostructure/remesh/height_deviation.h"
 #include "mesostructure/remesh/remesh_piece.h"
 #include "mesostructure/remesh/remesher.h"
 
@@ -29,6 +34,7 @@ struct SweptPiece {
     [[nodiscard]] const RemeshCorner<Real>& remeshCorner(int k) const { return piece->corners[size_t(k)]; }
     [[nodiscard]] glm::ivec3 remeshCell(int k) const { return piece->corners[size_t(k)].grid; }
     [[nodiscard]] const auto& remeshSeam(int k) const { return piece->seams[size_t(k)]; }
+    [[nodiscard]] int remeshParts(int k, int cells) const { return piece->parts[k] > 0 ? piece->parts[k] : cells; }
     [[nodiscard]] const RemeshFrame<Real>& remeshFrame() const { return *baseFrame; }
     [[nodiscard]] RemeshFootprint remeshFootprint(Real texels) { return heights.remeshFootprint(texels); }
     [[nodiscard]] Real remeshHeight(const RemeshFootprint& footprint, const Real2& uv) {
@@ -73,6 +79,9 @@ public:
         if (options_.bounds) addBound();
     }
 
+    /// Heights of the last piece's vertices.
+    [[nodiscard]] const std::vector<Real>& heights() const { return sweeping_.displaced; }
+
 private:
     void count(const typename Sweeping::RemeshSweep& s) {
         RemeshCounts& counts = mesh_.counts;
@@ -92,28 +101,32 @@ private:
         }
     }
 
-    /// Takes the piece's triangles into the bound: over each the map ranges between two heights, and the mesh between
-    /// those of its corners.
+    /// Takes the piece's triangles into the bound, as certified_cells.h says.
     void addBound() {
         const auto& view = sweeping_.view;
+        double longest = 0, apart = 0;
+        for (int k = 0; k < 3; ++k) {
+            const glm::dvec3 a(sweeping_.remeshCorner(k).direction), b(sweeping_.remeshCorner((k + 1) % 3).direction);
+            longest = std::max(longest, glm::length(a)), apart = std::max(apart, glm::distance(a, b));
+        }
         for (size_t i = firstIndex_; i < mesh_.indices.size(); i += 3) {
-            glm::dvec2 low(1e300), high(-1e300);
+            std::array<HeightCorner, 3> corners;
             double least = 1, most = 0, depth = 1e300, slope = 0;
             for (int k = 0; k < 3; ++k) {
                 const RemeshVertex<Real>& v = mesh_.vertices[mesh_.indices[i + k]];
-                low = glm::min(low, glm::dvec2(v.uv)), high = glm::max(high, glm::dvec2(v.uv));
                 const double height = sweeping_.displaced[mesh_.indices[i + k] - sweeping_.numberedFrom];
+                corners[size_t(k)] = {glm::dvec2(v.uv), height};
                 least = std::min(least, height), most = std::max(most, height);
                 depth = std::min(depth, double(v.position.z));
                 if (view.grid.isParallel == 0u && v.position.z > 0)
-                    slope = std::max(slope, std::hypot(double(v.position.x), double(v.position.y)) / v.position.z);
+                    slope =
+                        std::max(slope, std::hypot(double(v.position.x), double(v.position.y)) / double(v.position.z));
             }
-            const HeightRange range = surface_.heights->range(low, high);
-            const double off = surface_.longest * std::max(most - std::min(least, double(range.least)),
-                                                           std::max(most, double(range.most)) - least);
+            const double off = longest * heightDeviation(*surface_.heights, corners) + 0.25 * (most - least) * apart;
             const double pixels = double(view.grid.focal) * options_.cell * off;
             double bound = pixels;
-            if (view.grid.isParallel == 0u) bound = depth > off ? pixels * (1 + slope) / (depth - off) : 1e300;
+            if (view.grid.isParallel == 0u)
+                bound = depth > off ? pixels * std::hypot(1.0, slope) / (depth - off) : 1e300;
             mesh_.counts.boundPixels = std::max(mesh_.counts.boundPixels, bound);
         }
     }

@@ -63,10 +63,10 @@ struct RemeshSweeping : RemeshMath<T>, Piece {
     using Real3 = glm::vec<3, T>;
     using Math = RemeshMath<T>;
     using Math::remeshBetween, Math::remeshColumn, Math::remeshDepth, Math::remeshEdge, Math::remeshNearestPart,
-        Math::remeshPlan;
+        Math::remeshPart, Math::remeshPlan, Math::kRemeshMap, Math::kRemeshMost;
     using Piece::remeshAddTriangle, Piece::remeshAddVertex, Piece::remeshCell, Piece::remeshCorner, Piece::remeshFrame,
-        Piece::remeshFootprint, Piece::remeshHeight, Piece::remeshLevels, Piece::remeshMapWidth, Piece::remeshSeam,
-        Piece::view;
+        Piece::remeshFootprint, Piece::remeshHeight, Piece::remeshLevels, Piece::remeshMapWidth, Piece::remeshParts,
+        Piece::remeshSeam, Piece::view;
     using typename Math::RemeshColumn, typename Math::RemeshCorner, typename Math::RemeshFrame,
         typename Math::RemeshPlan, typename Math::RemeshSeam;
     using typename Piece::RemeshFootprint;

@@ -18,6 +18,7 @@ struct RemeshPiece {
     std::array<RemeshCorner<Real>, 3> corners{};
     std::array<typename RemeshMath<Real>::RemeshSeam, 3> seams{};  ///< of the edges from corner k to the next
     int halvings = 0;
+    glm::ivec3 parts{0};  ///< of the edges from corner k to the next, at most their cells; 0: their cells
 };
 
 }  // namespace vcp::meso

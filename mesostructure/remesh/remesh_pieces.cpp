@@ -24,7 +24,9 @@ void addPiece(std::vector<glm::uvec4>& quads, const RemeshPiece<float>& piece, c
     quads.push_back(quad(c[0].uv, c[1].uv));
     uint32_t seams = 0;
     for (uint32_t k = 0; k < 3; ++k) seams |= piece.seams[k].is ? 1u << k : 0u;
-    quads.emplace_back(word(c[2].uv.x), word(c[2].uv.y), seams, 0u);
+    uint32_t parts = 0;
+    for (int k = 0; k < 3; ++k) parts |= uint32_t(piece.parts[k]) << (10 * k);
+    quads.emplace_back(word(c[2].uv.x), word(c[2].uv.y), seams, parts);
     for (const auto& seam : piece.seams) quads.push_back(quad(seam.start, seam.end));
     quads.push_back(quad(frame.byU, frame.turned));
     for (const glm::vec3& v : {frame.byV, frame.directionByU, frame.directionByV, frame.facet})
@@ -59,16 +61,14 @@ RemeshBatch& nextBatch(RemeshPieces& pieces) {
     return batch;
 }
 
-}  // namespace
-
-Result<void> makeRemeshPieces(const RemeshSurface& surface, const RemeshCamera& camera, const RemeshOptions& options,
-                              RemeshPieces& pieces, const RemeshBatchLimits& limits, uint64_t mostVertices) {
-    VCP_TRY(checkRemeshing(options));
+Result<void> addPieces(const RemeshSurface& surface, const RemeshCamera& camera, const RemeshOptions& options,
+                       const CertifiedCells* cells, RemeshPieces& pieces, const RemeshBatchLimits& limits,
+                       uint64_t mostVertices) {
     pieces.view = remeshViewOf<float>(camera, options);
     pieces.used = 0, pieces.counts = {};
     RemeshBatch* batch = nullptr;
     uint64_t all = 0;
-    PieceMaker<float> maker(surface, camera, options, pieces.counts);
+    PieceMaker<float> maker(surface, camera, options, pieces.counts, cells);
     return maker.run([&](const RemeshPiece<float>& piece, const RemeshFrame<float>& frame) -> Result<void> {
         const PieceSize size = sizeOf(piece);
         ++pieces.counts.pieces;
@@ -82,6 +82,26 @@ Result<void> makeRemeshPieces(const RemeshSurface& surface, const RemeshCamera& 
         batch->mostVertices += size.mostVertices;
         return {};
     });
+}
+
+}  // namespace
+
+Result<void> makeRemeshPieces(const RemeshSurface& surface, const RemeshCamera& camera, const RemeshOptions& options,
+                              RemeshPieces& pieces, const RemeshBatchLimits& limits, uint64_t mostVertices) {
+    VCP_TRY(checkRemeshing(options));
+    return addPieces(surface, camera, options, nullptr, pieces, limits, mostVertices);
+}
+
+Result<void> makeRemeshPieces(CertifiedCells& cells, const RemeshCamera& camera, const RemeshOptions& options,
+                              RemeshPieces& pieces, const RemeshBatchLimits& limits, uint64_t mostVertices) {
+    VCP_TRY(checkRemeshing(options));
+    RemeshOptions ofMap = options;
+    ofMap.access = HeightAccess::Map;
+    RemeshCounts counts;
+    cells.choose(camera, options, counts);
+    VCP_TRY(addPieces(cells.patches(), camera, ofMap, &cells, pieces, limits, mostVertices));
+    pieces.counts.boundPixels = counts.boundPixels, pieces.counts.uncertified = counts.uncertified;
+    return {};
 }
 
 std::vector<uint32_t> remeshLevelWords(const HeightLevels& levels) {

@@ -9,6 +9,7 @@
 
 #include <glm/vec4.hpp>
 
+#include "mesostructure/remesh/certified_cells.h"
 #include "mesostructure/remesh/remesh_math.h"
 #include "mesostructure/remesh/remesher.h"
 
@@ -42,6 +43,11 @@ struct RemeshBatchLimits {
 /// Replaces the pieces by those of a view. Errors: as remesh(); Limit where there may be more than `mostVertices`,
 /// which is told before they are counted and may be two vertices a column too early.
 Result<void> makeRemeshPieces(const RemeshSurface& surface, const RemeshCamera& camera, const RemeshOptions& options,
+                              RemeshPieces& pieces, const RemeshBatchLimits& limits = {},
+                              uint64_t mostVertices = uint64_t{1} << 26);
+
+/// The same with certified cells, which are chosen for the view.
+Result<void> makeRemeshPieces(CertifiedCells& cells, const RemeshCamera& camera, const RemeshOptions& options,
                               RemeshPieces& pieces, const RemeshBatchLimits& limits = {},
                               uint64_t mostVertices = uint64_t{1} << 26);
 

@@ -101,7 +101,98 @@ void addPlaces(RemeshSurface& surface) {
     for (size_t i = 1; i < surface.firstPlace.size(); ++i) surface.firstPlace[i] += surface.firstPlace[i - 1];
 }
 
+/// Halves triangles until none of their edges is longer than so many texels.
+class Cutting {
+public:
+    Cutting(const RemeshSurface& from, double mostTexels, uint64_t mostTriangles)
+        : most_(mostTexels), mostTriangles_(mostTriangles), cut_(from) {
+        const glm::ivec2 size = from.heights->levels().front().size;
+        texels_ = {size.x, size.y / from.heights->rows()};
+        cut_.triangles.clear(), cut_.uvs.clear(), cut_.seams.clear(), cut_.seamUvs.clear(), cut_.places.clear();
+    }
+
+    Result<RemeshSurface> run(const RemeshSurface& from) {
+        for (size_t i = 0; i < from.triangles.size(); ++i) {
+            Part part{from.triangles[i], from.uvs[i], {}};
+            for (int k = 0; k < 3; ++k) {
+                const uint32_t seam = from.seams[i][k];
+                part.beyond[k] = seam != RemeshSurface::kNoSeam
+                                     ? from.seamUvs[seam]
+                                     : std::array<vec2, 2>{part.uvs[k], part.uvs[(k + 1) % 3]};
+            }
+            open_.push_back(part);
+            while (!open_.empty()) VCP_TRY(step());
+        }
+        addDensities(cut_), addSeams(cut_), addPlaces(cut_);
+        return std::move(cut_);
+    }
+
+private:
+    struct Part {
+        std::array<uint32_t, 3> corners;
+        std::array<vec2, 3> uvs;
+        std::array<std::array<vec2, 2>, 3> beyond;  ///< the other side's coordinates of the edges
+    };
+
+    [[nodiscard]] double lengthOf(vec2 a, vec2 b) const { return glm::length((dvec2(b) - dvec2(a)) * texels_); }
+
+    Result<void> step() {
+        const Part part = open_.back();
+        open_.pop_back();
+        int longest = -1;
+        double most = most_;
+        for (int k = 0; k < 3; ++k)
+            if (const double length = std::max(lengthOf(part.uvs[k], part.uvs[(k + 1) % 3]),
+                                               lengthOf(part.beyond[k][0], part.beyond[k][1]));
+                length > most)
+                longest = k, most = length;
+        if (longest < 0) {
+            cut_.triangles.push_back(part.corners), cut_.uvs.push_back(part.uvs);
+        } else {
+            halve(part, longest);
+        }
+        if (cut_.triangles.size() + open_.size() > mostTriangles_)
+            return Error{.code = ErrorCode::Limit,
+                         .message = fmt::format("a remeshed surface of more than {} patches of {} texels",
+                                                mostTriangles_, most_)};
+        return {};
+    }
+
+    void halve(const Part& part, int k) {
+        const int next = (k + 1) % 3, other = (k + 2) % 3;
+        const uint32_t middle = middleOf(part.corners[k], part.corners[next]);
+        const vec2 uv = 0.5f * (part.uvs[k] + part.uvs[next]), beyond = 0.5f * (part.beyond[k][0] + part.beyond[k][1]);
+        Part first = part, second = part;
+        first.corners[next] = second.corners[k] = middle;
+        first.uvs[next] = second.uvs[k] = uv;
+        first.beyond[k][1] = second.beyond[k][0] = beyond;
+        first.beyond[next] = {uv, part.uvs[other]}, second.beyond[other] = {part.uvs[other], uv};
+        open_.push_back(second), open_.push_back(first);
+    }
+
+    uint32_t middleOf(uint32_t a, uint32_t b) {
+        const auto [found, isNew] =
+            middles_.try_emplace((uint64_t{std::min(a, b)} << 32) | std::max(a, b), uint32_t(cut_.positions.size()));
+        if (isNew) {
+            cut_.positions.push_back(0.5f * (cut_.positions[a] + cut_.positions[b]));
+            cut_.directions.push_back(0.5f * (cut_.directions[a] + cut_.directions[b]));
+        }
+        return found->second;
+    }
+
+    double most_;
+    uint64_t mostTriangles_;
+    dvec2 texels_;
+    RemeshSurface cut_;
+    std::vector<Part> open_;
+    std::unordered_map<uint64_t, uint32_t> middles_;
+};
+
 }  // namespace
+
+Result<RemeshSurface> cutSurface(const RemeshSurface& surface, double mostTexels, uint64_t mostTriangles) {
+    return Cutting(surface, mostTexels, mostTriangles).run(surface);
+}
 
 Result<RemeshSurface> buildRemeshSurface(const BaseSurface& base, std::shared_ptr<const HeightLevels> heights,
                                          double height, double offset) {

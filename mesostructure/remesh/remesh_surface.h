@@ -44,4 +44,8 @@ struct RemeshSurface {
 Result<RemeshSurface> buildRemeshSurface(const BaseSurface& base, std::shared_ptr<const HeightLevels> heights,
                                          double height, double offset = 0);
 
+/// Returns the same surface in triangles with edges of at most so many texels of the map: longer ones are halved, along
+/// both sides of an edge alike. Errors: Limit (more than `mostTriangles`).
+Result<RemeshSurface> cutSurface(const RemeshSurface& surface, double mostTexels, uint64_t mostTriangles);
+
 }  // namespace vcp::meso

@@ -13,12 +13,14 @@ Result<void> checkRemeshing(const RemeshOptions& options) {
         return Error{.code = ErrorCode::Usage, .message = "cells of a remeshed surface must be above 0 pixels"};
     if (options.mostCells < 2 || options.mostCells > 1024)
         return Error{.code = ErrorCode::Usage, .message = "an edge has from 2 to 1024 cells before it is halved"};
+    if (!(options.errorPixels >= 0) || !std::isfinite(options.errorPixels))
+        return Error{.code = ErrorCode::Usage, .message = "a remeshed surface may err by 0 pixels or more"};
     return {};
 }
 
 Error tooManyVertices(uint64_t most) {
     return {.code = ErrorCode::Limit,
-            .message = fmt::format("remeshing makes more than {} vertices: larger cells make fewer", most)};
+            .message = fmt::format("remeshing makes more than {} vertices: larger cells, or errors, make fewer", most)};
 }
 
 template <class Real>

@@ -8,11 +8,11 @@
 // what the corners know of their density: triangles of one corner agree on it. Then each triangle is swept
 // (mesostructure/shared/remesh_math.h): columns of grid points, and strips of triangles between them.
 //
-// Errors on the screen are bounded where that is asked for: between its corners a triangle's heights are off by no more
-// than the map ranges over it.
+// Errors on the screen are bounded where that is asked for, triangle by triangle.
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include <glm/vec2.hpp>
@@ -29,19 +29,22 @@ struct RemeshCamera {
     bool isParallel = false;  ///< rays are parallel to `forward`; then `eye` is where depth is 0
     /// What is seen: left, lower, right, upper, in tangents, or in world units for parallel rays.
     glm::dvec4 seen{-1, -1, 1, 1};
-    double nearest = 1e-3;  ///< world units; nearer than this nothing is seen. Not used for parallel rays.
+    double nearest = 1e-3;              ///< world units; nearer than this nothing is seen. Not used for parallel rays.
+    std::optional<glm::dvec4> picture;  ///< what all of a picture sees of which this is a tile: its cells are chosen
 };
 
 enum class HeightAccess {
     Sample,  ///< the level's height
     Most,    ///< the most of the samples over the footprint, the least where the surface is seen from behind (4.1)
+    Map,     ///< the map's own height, whatever the footprint: of certified cells (certified_cells.h)
 };
 
 struct RemeshOptions {
-    double cell = 1;  ///< pixels
+    double cell = 1;         ///< pixels; of certified cells the widest that one may be
+    double errorPixels = 0;  ///< what certified cells may err by; others have one size
     HeightAccess access = HeightAccess::Sample;
     int mostCells = 256;  ///< of an edge that is not halved: 2 to 1024
-    bool bounds = false;  ///< RemeshCounts::boundPixels is filled in
+    bool bounds = false;  ///< RemeshCounts::boundPixels is filled in; of certified cells it always is
 };
 
 template <class Real>
@@ -58,7 +61,8 @@ struct RemeshCounts {
     uint64_t threeAxes = 0;          ///< pieces whose edges have three main directions
     uint64_t tooDeep = 0;            ///< pieces that were halved kMostHalvings times and are drawn as they are
     uint64_t quads = 0, strips = 0;  ///< steps of the sweep; columns that it goes between
-    double boundPixels = 0;          ///< most that a point of the mesh is off on the screen, from the ranges of heights
+    double boundPixels = 0;          ///< most that a point of the mesh is off on the screen
+    uint64_t uncertified = 0;        ///< patches of which boundPixels says nothing (certified_cells.h)
 };
 
 template <class Real>

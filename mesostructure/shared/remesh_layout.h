@@ -5,7 +5,8 @@
 //  0 to  2  corners: position, 1 / depth
 //  3 to  5  corners: direction, texels a world unit
 //  6 to  8  corners: cell of the grid, height
-//  9, 10    coordinates of corners 0, 1, 2; bit k: edge k has a seam; unused
+//  9, 10    coordinates of corners 0, 1, 2; bit k: edge k has a seam; parts of edges 0, 1, 2, 10 bits each, low first;
+//           0: an edge has as many as cells
 // 11 to 13  seams: coordinates of the edge's other side, at its start and its end
 // 14 to 17  frame: by u, turned; by v; direction by u; direction by v
 // 18        frame: the triangle's own normal

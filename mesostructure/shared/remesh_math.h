@@ -15,11 +15,15 @@ struct RemeshGrid {
     uint isParallel;  // 1: rays are parallel; depth is not logarithmic
 };
 
+// RemeshView::access, as HeightAccess.
+CONSTANT uint kRemeshMost = 1u;
+CONSTANT uint kRemeshMap = 2u;
+
 // How a frame's points are found.
 struct RemeshView {
     RemeshGrid grid;
-    Real cellSize;   // world units of a cell at depth 1, or at any of parallel rays
-    uint takesMost;  // 1: HeightAccess::Most
+    Real cellSize;  // world units of a cell at depth 1, or at any of parallel rays
+    uint access;    // to heights
 };
 
 // A corner of a piece. What is interpolated over the piece is the part up to `height`.
@@ -29,7 +33,7 @@ struct RemeshCorner {
     Real2 uv;
     Real density;  // texels a world unit
     Real height;   // of the corner itself, the same in all pieces
-    Real weight;   // 1 / depth: what perspective interpolates with
+    Real weight;   // 1 / depth, what perspective interpolates with; 1 where cells are the map's
 };
 
 // The coordinates of an edge's other side, at its start and its end.
@@ -161,6 +165,12 @@ INLINE RemeshColumn remeshColumn(ivec2 p, ivec2 q, ivec2 a, ivec2 b, int column)
     int last = a.y + remeshFloorDivided(2 * high - highSpan, 2 * highSpan);
     made.count = max(last - made.from + 1, 0);
     return made;
+}
+
+// Which of the `parts` points of an edge is nearest to the i-th of `cells`, of which there are at least as many: each
+// is nearest to one, and their order stays.
+INLINE int remeshPart(int i, int cells, int parts) {
+    return parts == cells ? i : (2 * i * parts + cells) / (2 * cells);
 }
 
 // Which of the parts of an edge from sweep coordinate `from` to `to`, of `cells` parts, ends nearest to a column. Next

@@ -3,12 +3,16 @@
 //   RemeshView view                           the frame's
 //   RemeshCorner remeshCorner(int k)          the piece's, and of each corner the cell alone, remeshCell(k)
 //   RemeshSeam remeshSeam(int k)              of the edge from corner k to the next
+//   int remeshParts(int k, int cells)         into how many parts that edge is split, at most its cells
 //   RemeshFrame remeshFrame()
 //   remesh_heights.h, and remeshMapWidth(): texels of the map along x
 //   void remeshAddVertex(uint number, Real3 position, Real3 normal, Real2 uv, Real height)
 //   void remeshAddTriangle(uint a, uint b, uint c)
 //
 // Vertices are numbered corners first, then the points of the edges 0, 1 and 2, then the grid points column by column.
+// Where an edge has fewer parts than cells, points of its cells lie at the nearest ends of its parts: so two pieces
+// with cells of different size have the same points on the edge between them. Triangles between points of one place are
+// points or lines, which draw nothing.
 //
 // A strip lies between the columns c and c + 1. Its left side goes up column c: from the primary edge over the grid
 // points to the point of the side edge that is nearest to the column; its right side likewise; and along the top there
@@ -28,11 +32,16 @@ INLINE Real remeshTexelsAt(Real3 position, Real density) {
     return texels;
 }
 
+// Returns what heights are taken from, for a footprint of so many texels.
+INLINE RemeshFootprint remeshHeightFootprint(Real texels) {
+    return remeshFootprint(view.access == kRemeshMap ? Real(0) : texels);
+}
+
 // Returns the height at a place, of a point of the base at `position`. The footprint is that of its texels.
 INLINE Real remeshHeightAt(CONST_REF(RemeshFootprint) footprint, Real texels, Real2 uv, Real3 position,
                            Real3 direction) {
     Real most = remeshHeight(footprint, uv);
-    if (view.takesMost == 0u || !(texels > Real(1))) return most;
+    if (view.access != kRemeshMost || !(texels > Real(1))) return most;
     // The footprint is stretched to a square, which the edge alone allows; its samples are half a cell away.
     PRECISE Real reach = Real(0.5) * texels / remeshMapWidth();
     Real3 along = view.grid.isParallel != 0u ? Real3(0, 0, 1) : position;
@@ -334,6 +343,7 @@ INLINE void remeshAddPoints(CONST_REF(RemeshSweep) s, int column, uint insideFir
         Real2 beyond;
         uint number;
         bool hasSeam = false;
+        int ownCorner = j < corners ? j : -1;
         if (j >= beforeInside) {
             number = insideFirst + uint(j - beforeInside);
             point = remeshInsidePoint(s, inside, column, j - beforeInside, a, b, c);
@@ -343,15 +353,22 @@ INLINE void remeshAddPoints(CONST_REF(RemeshSweep) s, int column, uint insideFir
             int to = isTop ? topTo : isUpright ? s.plan.apex : s.plan.second;
             int i = isTop ? topFirst + j - beforeTops : isUpright ? 1 + j - beforeUprights : column - s.first.x;
             bool isAhead = (from + 1) % 3 == to;
-            int k = isAhead ? from : to, n = s.cells[k], along = isAhead ? i : n - i;
-            RemeshSeam seam = remeshSeam(k);
+            int k = isAhead ? from : to, cells = s.cells[k], n = remeshParts(k, cells),
+                along = remeshPart(isAhead ? i : cells - i, cells, n);
             number = remeshOnEdge(s, from, to, i);
-            point = remeshEdgePoint(k, along, n);
-            hasSeam = seam.is;
-            if (hasSeam) beyond = remeshBeyond(seam, k, along, n);
+            if (along == 0 || along == n) {
+                ownCorner = along == 0 ? k : (k + 1) % 3;
+            } else {
+                RemeshSeam seam = remeshSeam(k);
+                point = remeshEdgePoint(k, along, n);
+                hasSeam = seam.is;
+                if (hasSeam) beyond = remeshBeyond(seam, k, along, n);
+            }
         } else {
-            RemeshCorner corner = remeshCorner(j);
             number = s.firstVertex + uint(j);
+        }
+        if (ownCorner >= 0) {
+            RemeshCorner corner = remeshCorner(ownCorner);
             point.position = corner.position;
             point.direction = corner.direction;
             point.uv = corner.uv;
@@ -360,12 +377,13 @@ INLINE void remeshAddPoints(CONST_REF(RemeshSweep) s, int column, uint insideFir
         }
         Real texels = remeshTexelsAt(point.position, point.density);
         RemeshFootprint footprint = remeshFootprint(texels);
-        if (j >= corners) {
-            point.height = remeshHeightAt(footprint, texels, point.uv, point.position, point.direction);
+        if (ownCorner < 0) {
+            RemeshFootprint sampled = remeshHeightFootprint(texels);
+            point.height = remeshHeightAt(sampled, texels, point.uv, point.position, point.direction);
             // Where the map jumps, an edge's point has the higher of its two sides' heights.
             if (hasSeam)
                 point.height =
-                    max(point.height, remeshHeightAt(footprint, texels, beyond, point.position, point.direction));
+                    max(point.height, remeshHeightAt(sampled, texels, beyond, point.position, point.direction));
         }
         PRECISE Real3 position = point.position + point.height * point.direction;
         remeshAddVertex(number, position, remeshNormal(frame, footprint, texels, point), point.uv, point.height);

@@ -32,7 +32,7 @@ RemeshLook remeshLook(const FrameRequest& request) {
 }  // namespace
 
 Result<void> MesoSurfacePass::setSurfaces(std::span<const MesoSurface> surfaces) {
-    surfaces_.clear();
+    surfaces_.clear(), raster_.forget();
     remeshed_ = 0;
     ++version_;
     std::map<const meso::MarchArrays*, std::shared_ptr<MesoTexels>> uploaded;

@@ -36,6 +36,9 @@ meso::RemeshCamera cameraOf(const meso::RemeshSurface& surface, const RemeshLook
     const double left = look.upperLeft.x - 1, top = look.upperLeft.y - 1;
     camera.seen = {left * stepX - basis.halfWidth, basis.halfHeight - (top + look.size.height + 2) * stepY,
                    (left + look.size.width + 2) * stepX - basis.halfWidth, basis.halfHeight - top * stepY};
+    // Cells are the whole picture's, so that tiles agree.
+    camera.picture = glm::dvec4(-basis.halfWidth - stepX, -basis.halfHeight - stepY, basis.halfWidth + stepX,
+                                basis.halfHeight + stepY);
     camera.nearest = nearestOf(surface);
     return camera;
 }
@@ -84,8 +87,17 @@ Result<void> RemeshRaster::prepare(RemeshTarget& target, PictureSize size, size_
 Result<void> RemeshRaster::remesh(RemeshTarget& target, size_t number, const RemeshedSurface& surface,
                                   const MesoTexels& levels, const RemeshLook& look) {
     RemeshDrawing& drawing = target.drawings[number];
-    VCP_TRY(meso::makeRemeshPieces(*surface.surface, cameraOf(*surface.surface, look), surface.options, target.pieces,
-                                   sweep_.limits()));
+    const meso::RemeshCamera camera = cameraOf(*surface.surface, look);
+    if (surface.options.errorPixels > 0) {
+        auto found = cells_.find(surface.surface.get());
+        if (found == cells_.end()) {
+            VCP_TRY_ASSIGN(auto cells, meso::CertifiedCells::create(*surface.surface));
+            found = cells_.emplace(surface.surface.get(), std::move(cells)).first;
+        }
+        VCP_TRY(meso::makeRemeshPieces(found->second, camera, surface.options, target.pieces, sweep_.limits()));
+    } else {
+        VCP_TRY(meso::makeRemeshPieces(*surface.surface, camera, surface.options, target.pieces, sweep_.limits()));
+    }
     drawing.view = target.pieces.view;
     return sweep_.prepare(drawing.batches, target.pieces, levels);
 }

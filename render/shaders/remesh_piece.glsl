@@ -35,6 +35,11 @@ RemeshSeam remeshSeam(int k) {
     return seam;
 }
 
+int remeshParts(int k, int cells) {
+    int parts = int(pieceQuad(10).w >> uint(10 * k) & 1023u);
+    return parts > 0 ? parts : cells;
+}
+
 RemeshFrame remeshFrame() {
     vec4 byU = pieceReals(14);
     RemeshFrame frame;

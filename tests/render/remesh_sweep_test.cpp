@@ -61,11 +61,19 @@ protected:
     Mesh onDevice(const RemeshSurface& surface, const RemeshCamera& camera, const RemeshOptions& options,
                   const RemeshBatchLimits& limits = {}) {
         EXPECT_TRUE(makeRemeshPieces(surface, camera, options, pieces_, limits));
-        const MesoTexels levels = *resources_->words(remeshLevelWords(*surface.heights));
+        return sweptMesh(*surface.heights);
+    }
+    Mesh onDevice(CertifiedCells& cells, const RemeshCamera& camera, const RemeshOptions& options,
+                  const RemeshBatchLimits& limits = {}) {
+        EXPECT_TRUE(makeRemeshPieces(cells, camera, options, pieces_, limits));
+        return sweptMesh(*cells.patches().heights);
+    }
+    Mesh sweptMesh(const HeightLevels& heights) {
+        const MesoTexels levels = *resources_->words(remeshLevelWords(heights));
         EXPECT_TRUE(pass_->prepare(swept_, pieces_, levels));
         EXPECT_TRUE(device_->submitAndWait([&](VkCommandBuffer commands) {
             barrierToAll(commands);
-            pass_->record(commands, swept_, *surface.heights, pieces_.view);
+            pass_->record(commands, swept_, heights, pieces_.view);
             barrierComputeToReadback(commands);
         }));
         Mesh mesh;
@@ -126,6 +134,26 @@ TEST_F(RemeshSweeps, VerticesAreTheProcessors) {
                     expectSame(onProcessor(surface, camera, options), mesh);
                     EXPECT_EQ(openEdges(mesh), 0u);
                 }
+    }
+}
+
+/// Edges with fewer parts than cells, and heights of the map itself.
+TEST_F(RemeshSweeps, CertifiedCellsAreTheProcessors) {
+    for (const auto& [base, heights] :
+         {std::pair("torus", "fbm"), std::pair("box", "ridged"), std::pair("quad", "fbm")}) {
+        CertifiedCells cells = *CertifiedCells::create(surfaceOf(base, 2, 0.05, heights));
+        for (const double error : {0.3, 2.0})
+            for (const double distance : {1.0, 3.0}) {
+                SCOPED_TRACE(std::string(base) + " " + std::to_string(error) + " " + std::to_string(distance));
+                const RemeshCamera camera = lookFrom(dvec3(1, 0.7, 0.8) * distance, {0, 0, 0}, 150);
+                const RemeshOptions options{.cell = 6, .errorPixels = error};
+                Mesh mesh;
+                ASSERT_TRUE(remesh(cells, camera, options, mesh));
+                expectSame(mesh, onDevice(cells, camera, options));
+                EXPECT_EQ(pieces_.counts.boundPixels, mesh.counts.boundPixels);
+                EXPECT_GT(mesh.counts.boundPixels, 0);
+                expectSame(mesh, onDevice(cells, camera, options, {.vertices = 20'000, .pieces = 100}));
+            }
     }
 }
 
@@ -241,7 +269,7 @@ TEST(RemeshedPieces, TooManyVerticesAreRefusedWithOneLine) {
     const auto made = makeRemeshPieces(surface, camera, {}, pieces, {}, 1000);
     ASSERT_FALSE(made.ok());
     EXPECT_EQ(made.error().code, ErrorCode::Limit);
-    EXPECT_EQ(made.error().message, "remeshing makes more than 1000 vertices: larger cells make fewer");
+    EXPECT_EQ(made.error().message, "remeshing makes more than 1000 vertices: larger cells, or errors, make fewer");
     EXPECT_EQ(makeRemeshPieces(surface, camera, {.cell = 0}, pieces).error().code, ErrorCode::Usage);
 }
 

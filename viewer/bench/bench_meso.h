@@ -133,6 +133,7 @@ struct RemeshRow {
     double cell = 1;                   ///< pixels
     double p50 = 0, p95 = 0, max = 0;  ///< of the error, pixels
     double boundPixels = 0;            ///< what the error is certified to be within
+    uint64_t uncertified = 0;          ///< patches of which that says nothing (RemeshCounts)
     double bias = 0;                   ///< mean height above the surface's, half quad edges
     double horizonLoss = 0;            ///< pixels that the horizon is lower, mean
     uint64_t vertices = 0, triangles = 0, bytes = 0;

@@ -226,6 +226,7 @@ std::string benchMesoJson(const BenchMesoReport& report) {
                             {"error_p95_pixels", row.p95},
                             {"error_max_pixels", row.max},
                             {"bound_pixels", row.boundPixels},
+                            {"uncertified", row.uncertified},
                             {"bias", row.bias},
                             {"horizon_loss_pixels", row.horizonLoss},
                             {"vertices", row.vertices},
@@ -311,17 +312,19 @@ std::string benchMesoMarkdown(const BenchMesoReport& report) {
     }
     if (!report.remeshed.empty()) {
         text +=
-            "\n| remeshed | view | filter | cell px | error p50 | p95 | max px | certified px | bias | horizon lower "
+            "\n| remeshed | view | filter | cell px | error p50 | p95 | max px | certified px | but of patches | bias "
+            "| horizon lower "
             "by px "
             "| vertices | ms | on a device: pieces | sweep | its processor ms "
-            "|\n|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n";
+            "|\n|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n";
         for (const RemeshRow& row : report.remeshed)
             text += fmt::format(
-                "| {} | {} | {} | {:g} | {:.3f} | {:.3f} | {:.2f} | {:.2f} | {:+.5f} | {:+.2f} | {} | {:.1f} | {:.2f} "
+                "| {} | {} | {} | {:g} | {:.3f} | {:.3f} | {:.2f} | {:.2f} | {} | {:+.5f} | {:+.2f} | {} | {:.1f} | "
+                "{:.2f} "
                 "| {:.1f} | "
                 "{:.1f} |\n",
-                row.asset, row.view, row.filter, row.cell, row.p50, row.p95, row.max, row.boundPixels, row.bias,
-                row.horizonLoss, row.vertices, row.ms, row.piecesMs, row.sweepMs, row.sweepProcessorMs);
+                row.asset, row.view, row.filter, row.cell, row.p50, row.p95, row.max, row.boundPixels, row.uncertified,
+                row.bias, row.horizonLoss, row.vertices, row.ms, row.piecesMs, row.sweepMs, row.sweepProcessorMs);
     }
     if (!report.remeshedPictures.empty()) {
         text +=

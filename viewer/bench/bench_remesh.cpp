@@ -6,9 +6,11 @@
 #include <cmath>
 #include <memory>
 
+#include <fmt/format.h>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
+#include "mesostructure/remesh/certified_cells.h"
 #include "mesostructure/remesh/remesher.h"
 #include "mesostructure/solids.h"
 #include "render/remesh_meter.h"
@@ -136,7 +138,9 @@ void judge(const RemeshMesh<double>& mesh, const Truth& truth, const Horizon& ho
             const dvec2 uv = w.x * v[0]->uv + w.y * v[1]->uv + w.z * v[2]->uv;
             const dvec3 there = truth.eyeSpace(uv);
             if (there.z < 0.01) continue;
-            errors.push_back(glm::distance(truth.pixel(on), truth.pixel(there)));
+            const dvec2 at = truth.pixel(on);
+            if (std::abs(at.x) > 0.5 * kWidth || std::abs(at.y) > 0.5 * kHeight) continue;
+            errors.push_back(glm::distance(at, truth.pixel(there)));
             bias += truth.worldHeight(on) - truth.heightAt(uv);
         }
     }
@@ -171,25 +175,52 @@ double seconds(std::chrono::steady_clock::time_point since) {
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - since).count();
 }
 
+/// What is remeshed: a surface with cells of one size, or certified cells.
+struct Remeshed {
+    const RemeshSurface& surface;
+    CertifiedCells* cells = nullptr;
+
+    template <class Real>
+    Result<void> mesh(const RemeshCamera& camera, const RemeshOptions& options, RemeshMesh<Real>& mesh) const {
+        return cells != nullptr ? remesh(*cells, camera, options, mesh) : remesh(surface, camera, options, mesh);
+    }
+    Result<RemeshTimes> measure(RemeshMeter& meter, const RemeshCamera& camera, const RemeshOptions& options) const {
+        return cells != nullptr ? meter.measure(*cells, camera, options, kRounds)
+                                : meter.measure(surface, camera, options, kRounds);
+    }
+};
+
 /// Times one thread of the processor, and the device where there is one.
-Result<void> timeFrame(const RemeshSurface& surface, const RemeshCamera& camera, const RemeshOptions& options,
+Result<void> timeFrame(const Remeshed& what, const RemeshCamera& camera, const RemeshOptions& options,
                        RemeshMeter* meter, RemeshRow& row) {
     std::array<double, kRounds> times{};
     RemeshMesh<float> drawn;
     for (double& time : times) {
         drawn.clear();
         const auto start = std::chrono::steady_clock::now();
-        VCP_TRY(remesh(surface, camera, options, drawn));
+        VCP_TRY(what.mesh(camera, options, drawn));
         time = seconds(start);
     }
     std::ranges::sort(times);
     row.ms = 1e3 * times[kRounds / 2];
     row.vertices = drawn.vertices.size(), row.triangles = drawn.indices.size() / 3, row.bytes = drawn.bytes();
     if (meter == nullptr) return {};
-    VCP_TRY_ASSIGN(const auto there, meter->measure(surface, camera, options, kRounds));
+    VCP_TRY_ASSIGN(const auto there, what.measure(*meter, camera, options));
     row.device = meter->device().name;
     row.piecesMs = there.piecesMs, row.sweepMs = there.sweepMs, row.sweepProcessorMs = there.sweepProcessorMs;
     return {};
+}
+
+/// Judges and times one view.
+Result<void> measureView(const Remeshed& what, const Truth& truth, const Horizon& horizon, const RemeshCamera& camera,
+                         const RemeshOptions& options, RemeshMeter* meter, RemeshRow& row) {
+    RemeshMesh<double> mesh;
+    RemeshOptions bounded = options;
+    bounded.bounds = true;
+    VCP_TRY(what.mesh(camera, bounded, mesh));
+    row.boundPixels = mesh.counts.boundPixels, row.uncertified = mesh.counts.uncertified;
+    judge(mesh, truth, horizon, row);
+    return timeFrame(what, camera, options, meter, row);
 }
 
 Result<void> measure(const std::string& name, const HeightMap& map, const BaseSurface& quad, const Filter& filter,
@@ -199,20 +230,23 @@ Result<void> measure(const std::string& name, const HeightMap& map, const BaseSu
     const auto levels = std::make_shared<const HeightLevels>(std::move(built));
     const double height = 2 * map.range;
     VCP_TRY_ASSIGN(const auto surface, buildRemeshSurface(quad, levels, height));
+    VCP_TRY_ASSIGN(auto cells, CertifiedCells::create(surface));
     for (const Place& place : kPlaces) {
         const RemeshCamera camera = cameraAt(place);
         const Truth truth(*levels, height, camera);
         const Horizon horizon = horizonOf(truth, map.size.x);
         for (const double cell : {1.0, 5.0, 20.0}) {
             RemeshRow row{.asset = name, .view = place.name, .filter = filter.name, .cell = cell};
-            RemeshMesh<double> mesh;
-            const RemeshOptions options{.cell = cell, .access = filter.access};
-            RemeshOptions bounded = options;
-            bounded.bounds = true;
-            VCP_TRY(remesh(surface, camera, bounded, mesh));
-            row.boundPixels = mesh.counts.boundPixels;
-            judge(mesh, truth, horizon, row);
-            VCP_TRY(timeFrame(surface, camera, options, meter, row));
+            VCP_TRY(
+                measureView({surface}, truth, horizon, camera, {.cell = cell, .access = filter.access}, meter, row));
+            rows.push_back(row);
+        }
+        // Certified cells take the map itself, so that how levels are fitted changes nothing but normals.
+        if (filter.fit != LevelFit::Least || filter.access != HeightAccess::Sample) continue;
+        for (const double error : {0.5, 1.0, 4.0}) {
+            RemeshRow row{.asset = name, .view = place.name, .filter = fmt::format("error {:g}", error), .cell = 1};
+            VCP_TRY(measureView({surface, &cells}, truth, horizon, camera, {.cell = row.cell, .errorPixels = error},
+                                meter, row));
             rows.push_back(row);
         }
     }

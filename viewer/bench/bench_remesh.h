@@ -4,8 +4,8 @@
 //
 // The field lies on a quad, seen at 1920 x 1200 from near over it and from 45 degrees. Errors are distances on the
 // screen between a point of a triangle and the displaced surface at the same place of the tile, in double, at four
-// places a triangle. The horizon is the highest point in each of 480 columns of the picture: of the mesh's vertices and
-// edges against the map's texels and between them.
+// places a triangle, of those that are in the picture. The horizon is the highest point in each of 480 columns of the
+// picture: of the mesh's vertices and edges against the map's texels and between them.
 #pragma once
 
 #include <cstdint>
@@ -18,8 +18,9 @@
 
 namespace vcp {
 
-/// Measures the height fields among the assets, at cells of 1, 5 and 20 pixels. `device`: as
-/// BenchMesoOptions::device. Errors: those of openMesoAsset, of RemeshMeter and of remeshing.
+/// Measures the height fields among the assets, at cells of 1, 5 and 20 pixels, and with certified cells that may err
+/// by 0.5, 1 and 4. `device`: as BenchMesoOptions::device. Errors: those of openMesoAsset, of RemeshMeter and of
+/// remeshing.
 Result<std::vector<RemeshRow>> benchRemesh(const std::vector<std::string>& assets,
                                            const std::optional<std::string>& device);
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <map>
 #include <memory>
+#include <tuple>
 
 #include <fmt/format.h>
 
@@ -90,9 +91,11 @@ public:
             return Error{.code = ErrorCode::Usage,
                          .message = fmt::format("{} takes no normal texture: leave it out, or take another method",
                                                 kRemeshMethod)};
-        auto& levels = levels_[{d.asset, d.withFilter}];
+        // Certified cells take heights from the map, and of coarser levels normals alone.
+        const LevelFit fit = d.errorPixels > 0 ? LevelFit::Averaged : LevelFit::Least;
+        auto& levels = levels_[{d.asset, d.withFilter, fit}];
         if (!levels) {
-            LevelFitOptions options;
+            LevelFitOptions options{.fit = fit};
             if (!d.withFilter) options.mostLevels = 1;
             VCP_TRY_ASSIGN(auto made, HeightLevels::build(*asset.heights, options));
             levels = std::make_shared<const HeightLevels>(std::move(made));
@@ -105,12 +108,13 @@ public:
             return error;
         }
         MesoSurface surface;
-        surface.remeshed = {std::make_shared<const RemeshSurface>(*std::move(made)), {.cell = d.cell}};
+        surface.remeshed = {std::make_shared<const RemeshSurface>(*std::move(made)),
+                            {.cell = d.cell, .errorPixels = d.errorPixels}};
         return surface;
     }
 
 private:
-    std::map<std::pair<std::string, bool>, std::shared_ptr<const HeightLevels>> levels_;
+    std::map<std::tuple<std::string, bool, LevelFit>, std::shared_ptr<const HeightLevels>> levels_;
 };
 
 using Transfer = std::shared_ptr<const TransferVolume>;

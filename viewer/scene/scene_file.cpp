@@ -29,8 +29,9 @@ constexpr size_t kMostSurfaces = 64;
 constexpr size_t kMostPathPoints = 1000;                    // of a surface
 constexpr double kShortestPath = 0.1, kLongestPath = 3600;  // seconds
 constexpr int kDeepestScene = 16;
-constexpr int kMostSteps = 4096;                             // of relief mapping
-constexpr double kSmallestCell = 0.25, kLargestCell = 1000;  // pixels, of remeshing
+constexpr int kMostSteps = 4096;                              // of relief mapping
+constexpr double kSmallestCell = 0.25, kLargestCell = 1000;   // pixels, of remeshing
+constexpr double kSmallestError = 0.05, kLargestError = 100;  // pixels, of remeshing
 // Within this range double precision resolves a millimetre where units are metres, and more.
 constexpr double kLargestNumber = 1e12, kLargestScale = 1e9;
 
@@ -195,7 +196,7 @@ private:
         onlyKeys(json, at, {"asset",  "surface", "subdivide", "tiles",          "height", "translate", "scale",
                             "up",     "colour",  "texture",   "normal_texture", "method", "cell",      "grid",
                             "cones",  "steps",   "rank",      "directions",     "base",   "far",       "offset",
-                            "filter", "path",    "seconds",   "transfer"});
+                            "filter", "path",    "seconds",   "transfer",       "error"});
         if (!json.contains("asset"))
             wrong(at, "\"asset\" is missing");
         else
@@ -223,6 +224,7 @@ private:
             made.normalTexture = named(json["normal_texture"], at + "/normal_texture", isPicture);
         if (json.contains("method")) made.method.name = methodNamed(json["method"], at + "/method");
         if (json.contains("cell")) made.cell = pixels(json["cell"], at + "/cell");
+        if (json.contains("error")) made.errorPixels = allowedError(json["error"], at + "/error");
         if (json.contains("grid")) made.method.cells = whole(json["grid"], at + "/grid", meso::kMaxGridEdge);
         if (json.contains("cones")) made.method.cones = cones(json["cones"], at + "/cones");
         if (json.contains("steps")) made.method.steps = whole(json["steps"], at + "/steps", kMostSteps);
@@ -298,6 +300,13 @@ private:
         if (!(edge >= kSmallestCell && edge <= kLargestCell))
             return wrong(at, fmt::format("must be from {:g} to {:g} pixels", kSmallestCell, kLargestCell)), 1;
         return edge;
+    }
+
+    double allowedError(const Json& json, const std::string& at) {
+        const double most = json.is_number() ? json.get<double>() : -1;
+        if (!(most == 0 || (most >= kSmallestError && most <= kLargestError)))
+            return wrong(at, fmt::format("must be 0 or from {:g} to {:g} pixels", kSmallestError, kLargestError)), 0;
+        return most;
     }
 
     std::string methodNamed(const Json& json, const std::string& at) {

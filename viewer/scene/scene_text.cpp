@@ -52,6 +52,7 @@ OrderedJson surfaceJson(const MesoSurfaceDescription& surface) {
     put("normal_texture", surface.normalTexture, usual.normalTexture);
     json["method"] = surface.method.name;
     put("cell", surface.cell, usual.cell);
+    put("error", surface.errorPixels, usual.errorPixels);
     put("grid", surface.method.cells, usual.method.cells);
     const meso::Cones cones = surface.method.cones, usualCones = usual.method.cones;
     if (cones.azimuth != usualCones.azimuth || cones.elevation != usualCones.elevation)

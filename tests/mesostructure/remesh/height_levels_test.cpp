@@ -117,31 +117,6 @@ TEST(HeightLevels, ThePrintedFitFallsFromTheMeans) {
     }
 }
 
-TEST(HeightLevels, RangesHoldAllThatIsInABox) {
-    for (const glm::ivec2 size : {glm::ivec2(64, 64), glm::ivec2(23, 9)}) {
-        HeightMap map{size, 0.3, {}};
-        std::mt19937 random(7);
-        for (int i = 0; i < size.x * size.y; ++i) map.texels.push_back(uint16_t(random()));
-        const HeightLevels levels = levelsOf(map, {.fit = LevelFit::Averaged});
-        for (uint32_t seed = 0; seed < 2000; ++seed) {
-            std::mt19937 draw(seed);
-            std::uniform_real_distribution<double> place(-2, 2), edge(0, seed % 2 == 0 ? 0.05 : 0.6);
-            const glm::dvec2 low(place(draw), place(draw)), high = low + glm::dvec2(edge(draw), edge(draw));
-            const HeightRange range = levels.range(low, high);
-            for (int j = 0; j <= 6; ++j)
-                for (int i = 0; i <= 6; ++i) {
-                    const double height = levels.height(0, low + (high - low) * glm::dvec2(i, j) / 6.0);
-                    ASSERT_GE(height, range.least - 1e-6) << seed;
-                    ASSERT_LE(height, range.most + 1e-6) << seed;
-                }
-        }
-        const HeightRange all = levels.range({0, 0}, {5, 5});
-        const auto [low, high] = std::ranges::minmax(map.texels);
-        EXPECT_FLOAT_EQ(all.least, low / 65535.0f);
-        EXPECT_FLOAT_EQ(all.most, high / 65535.0f);
-    }
-}
-
 TEST(HeightLevels, RefuseMapsThatAreNone) {
     EXPECT_EQ(HeightLevels::build({{2, 2}, 1, {1, 2, 3}}).error().code, ErrorCode::InvalidInput);
     EXPECT_EQ(HeightLevels::build({{0, 0}, 1, {}}).error().code, ErrorCode::InvalidInput);

@@ -271,6 +271,17 @@ TEST(SceneFile, SurfacesMayBeRemeshed) {
     ASSERT_TRUE(made) << made.error().line();
     EXPECT_TRUE(made->surfaces[0].remeshed.surface);
     EXPECT_EQ(made->surfaces[0].remeshed.options.cell, 5);
+    EXPECT_EQ(made->surfaces[0].remeshed.options.errorPixels, 0.5);
+    for (const double error : {0.0, 0.05, 4.0}) {
+        const auto allowed = sceneOf(fmt::format(", \"error\": {}", error));
+        ASSERT_TRUE(allowed) << allowed.error().line();
+        EXPECT_EQ(allowed->surfaces[0].errorPixels, error);
+        EXPECT_EQ(sceneFromJson(sceneToJson(*allowed), "m.json", {})->surfaces[0].errorPixels, error);
+    }
+    for (const char* error : {"-1", "0.01", "101", "\"2\"", "null", "true"})
+        EXPECT_EQ(sceneOf(std::string(", \"error\": ") + error).error().line(),
+                  "m.json: line 1: \"error\" must be 0 or from 0.05 to 100 pixels")
+            << error;
     EXPECT_NEAR(made->bounds.high.x, 1, 1e-9);
     EXPECT_GT(made->bounds.high.z, 0.01);
 }

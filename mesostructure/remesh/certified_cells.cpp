@@ -1,0 +1,350 @@
+#include "mesostructure/remesh/certified_cells.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <unordered_map>
+
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+
+#include "mesostructure/remesh/height_deviation.h"
+#include "mesostructure/remesh/piece_maker.h"
+
+namespace vcp::meso {
+
+namespace {
+
+using glm::dvec2, glm::dvec3, glm::dvec4;
+
+constexpr uint64_t kMostPatches = uint64_t{1} << 22;
+// Patches are wider where there are more than so many.
+constexpr double kManyPatches = 1 << 17;
+constexpr int kLog2Narrowest = 4, kLog2Widest = 8;  // texels of a patch's edge
+constexpr int kLog2FinestCells = 4;                 // finest cells of a texel's edge, at most
+constexpr int kLog2MostCells = 9;                   // of a patch's edge; two more bits are there for rounding
+// What is known of a patch is forgotten where it is more than so many combinations of steps.
+constexpr size_t kMostKnown = 64;
+constexpr double kNarrowestPixels = 0.5;  // of a cell
+constexpr double kNothing = std::numeric_limits<double>::infinity();
+
+dvec2 texelsOf(const HeightLevels& heights) {
+    const glm::ivec2 size = heights.levels().front().size;
+    return {size.x, size.y / heights.rows()};
+}
+
+/// Returns log2 of the texels along a patch's edge.
+int patchEdge(const RemeshSurface& surface) {
+    const dvec2 texels = texelsOf(*surface.heights);
+    double area = 0;
+    for (const auto& uvs : surface.uvs) {
+        const dvec2 a = (dvec2(uvs[1]) - dvec2(uvs[0])) * texels, b = (dvec2(uvs[2]) - dvec2(uvs[0])) * texels;
+        area += 0.5 * std::abs(a.x * b.y - a.y * b.x);
+    }
+    int edge = kLog2Narrowest;
+    while (edge < kLog2Widest && area > kManyPatches * 0.5 * std::exp2(2 * edge)) ++edge;
+    return edge;
+}
+
+}  // namespace
+
+/// A camera, and the corners of the patches in its eye space.
+struct CertifiedCells::View {
+    const RemeshCamera& camera;
+    double cell;      ///< pixels
+    dvec4 picture;    ///< what is seen: left, lower, right, upper
+    double steepest;  ///< of the slopes that are seen, sqrt(1 + x^2 + y^2)
+    std::vector<dvec3> positions, directions;
+};
+
+Result<CertifiedCells> CertifiedCells::create(const RemeshSurface& surface) {
+    CertifiedCells made;
+    const int edge = patchEdge(surface);
+    made.finest_ = std::min(kLog2FinestCells, kLog2MostCells - edge);
+    made.coarsest_ = edge + made.finest_;
+    VCP_TRY_ASSIGN(made.patches_, cutSurface(surface, std::exp2(edge), kMostPatches));
+    const dvec2 texels = texelsOf(*surface.heights) * std::exp2(made.finest_);
+    for (const auto& uvs : made.patches_.uvs) {
+        std::array<dvec2, 3> at;
+        for (size_t k = 0; k < 3; ++k) at[k] = glm::floor(dvec2(uvs[k]) * texels + 0.5);
+        // Multiples of the widest cell may be left out of all corners.
+        const double widest = std::exp2(made.coarsest_);
+        const dvec2 from = glm::floor(glm::min(at[0], glm::min(at[1], at[2])) / widest) * widest;
+        auto& grid = made.grids_.emplace_back();
+        for (size_t k = 0; k < 3; ++k) grid[k] = glm::ivec2(at[k] - from);
+    }
+    made.addEdges(), made.measureCorners();
+    made.known_.resize(made.grids_.size());
+    return made;
+}
+
+void CertifiedCells::addEdges() {
+    std::unordered_map<uint64_t, uint32_t> numbers;
+    for (uint32_t i = 0; i < patches_.triangles.size(); ++i) {
+        auto& own = edges_.emplace_back();
+        for (size_t k = 0; k < 3; ++k) {
+            const uint32_t a = patches_.triangles[i][k], b = patches_.triangles[i][(k + 1) % 3];
+            const glm::ivec2 off = glm::abs(grids_[i][(k + 1) % 3] - grids_[i][k]);
+            const int parts = std::max({off.x, off.y, 1});
+            const auto [found, isNew] =
+                numbers.try_emplace((uint64_t{std::min(a, b)} << 32) | std::max(a, b), uint32_t(neighbours_.size()));
+            own[k] = found->second;
+            if (isNew) {
+                neighbours_.push_back({i, i}), edgeParts_.push_back(parts);
+            } else {
+                // Along a seam the two sides may have different texels.
+                neighbours_[own[k]][1] = i, edgeParts_[own[k]] = std::min(edgeParts_[own[k]], parts);
+            }
+        }
+    }
+    edgeSteps_.assign(neighbours_.size(), coarsest_);
+}
+
+void CertifiedCells::measureCorners() {
+    for (size_t i = 0; i < patches_.positions.size(); ++i) {
+        double most = 0;
+        for (uint32_t k = patches_.firstPlace[i]; k < patches_.firstPlace[i + 1]; ++k)
+            most = std::max(most, patches_.heights->height(0, dvec2(patches_.places[k])));
+        heights_.push_back(most);
+    }
+}
+
+PatchCells CertifiedCells::evenly(size_t patch, int step) const {
+    PatchCells cells{step, {}};
+    for (int k = 0; k < 3; ++k) cells.parts[k] = std::max(edgeParts_[edges_[patch][size_t(k)]] >> step, 1);
+    return cells;
+}
+
+PatchCells CertifiedCells::cells(size_t patch) const {
+    PatchCells cells{coarsest_, {}};
+    for (int k = 0; k < 3; ++k) {
+        const uint32_t edge = edges_[patch][size_t(k)];
+        cells.step = std::min(cells.step, edgeSteps_[edge]);
+        cells.parts[k] = std::max(edgeParts_[edge] >> edgeSteps_[edge], 1);
+    }
+    return cells;
+}
+
+std::array<glm::ivec3, 3> CertifiedCells::corners(size_t patch, int step) const {
+    std::array<glm::ivec3, 3> at;
+    // Halves go up at every step, so that an edge of n finest cells has n / 2^step cells, rounded down, at least.
+    for (size_t k = 0; k < 3; ++k) at[k] = glm::ivec3((grids_[patch][k] + (1 << step >> 1)) >> step, 0);
+    return at;
+}
+
+CertifiedCells::Seen CertifiedCells::seenIn(const View& view, size_t patch) const {
+    const RemeshCamera& camera = view.camera;
+    std::array<dvec3, 3> directions;
+    std::array<dvec3, 6> hull;
+    double longest = 0;
+    for (size_t k = 0; k < 3; ++k) {
+        const uint32_t corner = patches_.triangles[patch][k];
+        directions[k] = view.directions[corner], hull[k] = view.positions[corner];
+        hull[k + 3] = hull[k] + directions[k];
+        longest = std::max(longest, glm::length(directions[k]));
+    }
+    if (isOutsideView(camera, view.picture, hull)) return {};
+    Seen seen{.is = true};
+    limitSteps(view, patch, seen);
+    if (camera.isParallel) {
+        for (const dvec3& d : directions)
+            seen.perHeight = std::max(seen.perHeight, camera.focal * glm::length(dvec2(d)));
+        seen.perUnit = camera.focal;
+        return seen;
+    }
+    dvec3 low(kNothing), high(-kNothing);
+    for (const dvec3& p : hull) low = glm::min(low, p), high = glm::max(high, p);
+    const dvec4 s = view.picture;
+    dvec2 lowest(s.x, s.y), highest(s.z, s.w);
+    if (low.z > 0) {
+        dvec2 least(kNothing), most(-kNothing);
+        for (const dvec3& p : hull) least = glm::min(least, dvec2(p) / p.z), most = glm::max(most, dvec2(p) / p.z);
+        lowest = glm::clamp(least, lowest, highest), highest = glm::clamp(most, lowest, highest);
+    }
+    // Two points of one place lie at depths from low.z on; and what is seen is no nearer than the box about the patch.
+    seen.depth = low.z;
+    const double away = glm::length(glm::max(glm::max(low, -high), dvec3(0))),
+                 least = std::max(away / view.steepest, camera.nearest);
+    if (least > seen.depth) seen.depth = least, seen.nearer = longest;
+    for (const double x : {lowest.x, highest.x})
+        for (const double y : {lowest.y, highest.y}) {
+            const dvec2 t(x, y);
+            for (const dvec3& d : directions)
+                seen.perHeight = std::max(seen.perHeight, camera.focal * glm::length(dvec2(d) - t * d.z));
+            seen.perUnit = std::max(seen.perUnit, camera.focal * std::sqrt(1 + glm::dot(t, t)));
+        }
+    return seen;
+}
+
+double CertifiedCells::pixels(const Seen& seen, double height, double across) const {
+    const double depth = seen.nearer > 0 ? seen.depth - seen.nearer * height - across : seen.depth;
+    return depth > 0 ? (seen.perHeight * height + seen.perUnit * across) / depth : kNothing;
+}
+
+void CertifiedCells::limitSteps(const View& view, size_t patch, Seen& seen) const {
+    dvec3 middle(0);
+    double density = 0;
+    for (const uint32_t corner : patches_.triangles[patch]) {
+        middle += (view.positions[corner] + 0.5 * view.directions[corner]) / 3.0;
+        density = std::max(density, double(patches_.densities[corner]));
+    }
+    const double depth = view.camera.isParallel ? 1 : std::max(middle.z, view.camera.nearest);
+    const double texels = depth / view.camera.focal * density;  // of a pixel
+    const auto stepOf = [&](double pixels) {
+        return std::clamp(finest_ + int(std::floor(std::log2(std::clamp(pixels * texels, 1e-6, 1e6)))), 0, coarsest_);
+    };
+    // Normals are those of corners: so that all of the map's are shown, no cell is wider than a texel, or than a pixel
+    // where that is wider.
+    seen.pixel = stepOf(view.cell), seen.widest = std::max(seen.pixel, finest_);
+    seen.narrowest = std::min(stepOf(kNarrowestPixels), seen.widest);
+}
+
+void CertifiedCells::measure(size_t patch, Known& known, double enough) {
+    // The sweep moves places as it moves directions; where these lie in the place of those, they come out as they are.
+    RemeshPiece<double> piece;
+    bool mayJump = false;
+    const auto corners = this->corners(patch, known.cells.step);
+    for (size_t k = 0; k < 3; ++k) {
+        const uint32_t corner = patches_.triangles[patch][k];
+        auto& to = piece.corners[k];
+        to.position = dvec3(patches_.directions[corner]), to.direction = dvec3(0);
+        to.grid = corners[k], to.uv = dvec2(patches_.uvs[patch][k]);
+        to.density = 0, to.height = heights_[corner], to.weight = 1;
+        mayJump = mayJump || patches_.firstPlace[corner + 1] - patches_.firstPlace[corner] > 1;
+        if (const uint32_t seam = patches_.seams[patch][k]; seam != RemeshSurface::kNoSeam)
+            piece.seams[k] = {true, dvec2(patches_.seamUvs[seam][0]), dvec2(patches_.seamUvs[seam][1])};
+    }
+    piece.parts = known.cells.parts;
+    swept_.clear();
+    const RemeshMath<double>::RemeshView flat{{1, 1, 1, 1}, 0, RemeshMath<double>::kRemeshMap};
+    PieceSweep<double> sweep(patches_, {}, flat, swept_);
+    sweep.sweep(piece, {});
+    double height = 0, across = 0, jump = 0;
+    known.isWhole = true;
+    for (size_t i = 0; i < swept_.indices.size() && known.isWhole; i += 3) {
+        std::array<HeightCorner, 3> at;
+        std::array<dvec3, 3> directions;
+        double least = kNothing, most = -kNothing;
+        for (size_t k = 0; k < 3; ++k) {
+            const uint32_t number = swept_.indices[i + k];
+            at[k] = {swept_.vertices[number].uv, sweep.heights()[number]};
+            directions[k] = swept_.vertices[number].position;
+            least = std::min(least, at[k].height), most = std::max(most, at[k].height);
+            if (!mayJump) continue;
+            const double own = patches_.heights->height(0, at[k].at);
+            jump = std::max(jump, at[k].height - own), at[k].height = own;
+        }
+        double apart = 0;
+        for (size_t k = 0; k < 3; ++k) apart = std::max(apart, glm::distance(directions[k], directions[(k + 1) % 3]));
+        across = std::max(across, 0.25 * (most - least) * apart);
+        height = std::max(height, heightDeviation(*patches_.heights, at, enough));
+        known.isWhole = !(height > enough);
+    }
+    // Rounded up, so that what is kept in single precision is no less.
+    known.height = std::nextafter(float(height), 2.0f);
+    known.jump = std::nextafter(float(jump), 2.0f);
+    known.across = std::nextafter(float(across), std::numeric_limits<float>::infinity());
+}
+
+CertifiedCells::Known& CertifiedCells::known(size_t patch, const Seen& seen, const PatchCells& cells, double allowed) {
+    auto& all = known_[patch];
+    auto found = std::ranges::find(all, cells, &Known::cells);
+    const bool isNew = found == all.end();
+    if (isNew) {
+        if (all.size() >= kMostKnown) all.clear();
+        all.push_back({.cells = cells}), found = all.end() - 1;
+    }
+    // Above so much the error is more than is allowed, whatever else there is.
+    const double enough = seen.perHeight > 0 ? 1.01 * allowed * seen.depth / seen.perHeight : kNothing;
+    if (isNew || (!found->isWhole && !(double(found->height) > enough))) measure(patch, *found, enough);
+    return *found;
+}
+
+bool CertifiedCells::keeps(size_t patch, const Seen& seen, const PatchCells& cells, double allowed) {
+    const Known& of = known(patch, seen, cells, allowed);
+    if (!of.isWhole) return false;
+    const double height = double(of.height), jump = double(of.jump), across = double(of.across);
+    if (pixels(seen, height + jump, across) <= allowed) return true;
+    // No cells take a jump away; narrow ones keep it where it is.
+    return cells.step <= seen.pixel && pixels(seen, jump, 0) > 0.5 * allowed && pixels(seen, height, across) <= allowed;
+}
+
+int CertifiedCells::wantedStep(size_t patch, Seen& seen, double allowed) {
+    for (int step = seen.widest; step >= seen.narrowest; --step)
+        if (seen.canKeep = keeps(patch, seen, evenly(patch, step), allowed); seen.canKeep) return step;
+    return std::clamp(std::min(seen.pixel, finest_), seen.narrowest, seen.widest);
+}
+
+/// Makes a patch's edges finer by a step: first those that are coarser than its cells.
+void CertifiedCells::refine(size_t patch, std::vector<uint32_t>& open) {
+    const int step = cells(patch).step;
+    const auto& own = edges_[patch];
+    const bool isEven = std::ranges::all_of(own, [&](uint32_t edge) { return edgeSteps_[edge] == step; });
+    if (isEven && step == 0) return;
+    for (const uint32_t edge : own) {
+        if (!isEven && edgeSteps_[edge] == step) continue;
+        --edgeSteps_[edge];
+        for (const uint32_t beside : neighbours_[edge])
+            if (seen_[beside].canKeep) open.push_back(beside);
+    }
+}
+
+void CertifiedCells::choose(const RemeshCamera& camera, const RemeshOptions& options, RemeshCounts& counts) {
+    const dvec4 s = camera.picture.value_or(camera.seen);
+    const dvec2 farthest = glm::max(glm::abs(dvec2(s.x, s.y)), glm::abs(dvec2(s.z, s.w)));
+    View view{camera, options.cell, s, std::sqrt(1 + glm::dot(farthest, farthest)), {}, {}};
+    const auto turned = [&](dvec3 v) {
+        return dvec3(glm::dot(v, camera.right), glm::dot(v, camera.up), glm::dot(v, camera.forward));
+    };
+    const dvec3 from = patches_.origin - camera.eye;
+    for (const glm::vec3& p : patches_.positions) view.positions.push_back(turned(from + dvec3(p)));
+    for (const glm::vec3& d : patches_.directions) view.directions.push_back(turned(dvec3(d)));
+
+    seen_.resize(patches_.triangles.size());
+    std::ranges::fill(edgeSteps_, coarsest_);
+    std::vector<uint32_t> open;
+    for (uint32_t i = 0; i < seen_.size(); ++i) {
+        seen_[i] = seenIn(view, i);
+        if (!seen_[i].is) continue;
+        const int step = wantedStep(i, seen_[i], options.errorPixels);
+        for (const uint32_t edge : edges_[i]) edgeSteps_[edge] = std::min(edgeSteps_[edge], step);
+        if (seen_[i].canKeep) open.push_back(i);
+    }
+    // What a patch wants it may have; but its cells are as fine as the finest of its edges, and these as coarse as
+    // another patch made them.
+    while (!open.empty()) {
+        const uint32_t patch = open.back();
+        open.pop_back();
+        if (!keeps(patch, seen_[patch], cells(patch), options.errorPixels)) refine(patch, open);
+    }
+    for (uint32_t i = 0; i < seen_.size(); ++i) {
+        if (!seen_[i].is) continue;
+        const Known& of = known(i, seen_[i], cells(i), options.errorPixels);
+        const double error = pixels(seen_[i], double(of.height) + double(of.jump), double(of.across));
+        if (of.isWhole && error <= options.errorPixels)
+            counts.boundPixels = std::max(counts.boundPixels, error);
+        else
+            ++counts.uncertified;
+    }
+}
+
+template <class Real>
+Result<void> remesh(CertifiedCells& cells, const RemeshCamera& camera, const RemeshOptions& options,
+                    RemeshMesh<Real>& mesh, uint64_t mostVertices) {
+    VCP_TRY(checkRemeshing(options));
+    RemeshOptions ofMap = options;
+    ofMap.access = HeightAccess::Map, ofMap.bounds = false;
+    cells.choose(camera, options, mesh.counts);
+    PieceSweep<Real> sweep(cells.patches(), ofMap, remeshViewOf<Real>(camera, ofMap), mesh);
+    PieceMaker<Real> maker(cells.patches(), camera, ofMap, mesh.counts, &cells);
+    return maker.run([&](const RemeshPiece<Real>& piece, const RemeshFrame<Real>& frame) -> Result<void> {
+        sweep.sweep(piece, frame);
+        if (mesh.vertices.size() > mostVertices) return tooManyVertices(mostVertices);
+        return {};
+    });
+}
+
+template Result<void> remesh(CertifiedCells&, const RemeshCamera&, const RemeshOptions&, RemeshMesh<float>&, uint64_t);
+template Result<void> remesh(CertifiedCells&, const RemeshCamera&, const RemeshOptions&, RemeshMesh<double>&, uint64_t);
+
+}  // namespace vcp::meso

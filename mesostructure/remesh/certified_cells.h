@@ -1,0 +1,114 @@
+// Cells whose error on the screen is certified: for each view the coarsest that keep what is allowed.
+//
+// The cells of remesher.h are the screen's, and what lies between their corners is not known before they are made. Here
+// cells are the map's, 2^s texels wide: what they leave out does not depend on the view. The surface is cut once into
+// patches of some 16 texels' edge, by halving what is longer. A view gives each patch a step s, each edge between two
+// patches the finer of their steps, and sweeps a patch with cells as fine as its finest edge. Patches are swept as
+// pieces are (mesostructure/shared/remesh_sweep.h), with the map's cells in the place of the grid's; points of a patch
+// along an edge with fewer parts than its cells lie at the ends of those parts, so that nothing gapes.
+//
+// The certificate. A point of the base has place p, direction d and the map's height h; there the mesh has the mean of
+// its corners' h_i d_i. The two differ by (h - mean of h_i) d less the covariance of h_i and d_i, which is at most a
+// quarter of the range of h_i times that of d_i. The first difference is known exactly (height_deviation.h), triangle
+// by triangle; both are kept for a patch and its steps, and a view turns them into pixels: along the directions of the
+// patch, over all depths that it may have. So every point of the picture of the mesh is within so many pixels of the
+// displaced surface's at the same place of the base, and the other way round.
+//
+// What is not certified: the rounding of single precision; what is nearer to the eye than the patch's own size; what
+// would take cells narrower than half a pixel; and where the map jumps along an edge, the slope from the higher side's
+// heights down to the lower side, within cells beside the edge that are at most options.cell pixels wide.
+// RemeshCounts::uncertified counts the patches of the last three. One thread at a time.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+
+#include "mesostructure/remesh/remesher.h"
+
+namespace vcp::meso {
+
+/// How a patch is swept.
+struct PatchCells {
+    int step = 0;         ///< its cells are 2^step of the finest ones wide
+    glm::ivec3 parts{1};  ///< of its edges, at most as many as they have cells
+
+    bool operator==(const PatchCells&) const = default;
+};
+
+class CertifiedCells {
+public:
+    /// Cuts a surface into patches. Errors: Limit (more than 2^22 patches).
+    static Result<CertifiedCells> create(const RemeshSurface& surface);
+
+    /// Chooses the cells of a view: errors of at most options.errorPixels on the screen, where the finest cells can,
+    /// and none wider than options.cell pixels, or a texel where that is wider. Fills in boundPixels and uncertified.
+    void choose(const RemeshCamera& camera, const RemeshOptions& options, RemeshCounts& counts);
+
+    /// The surface, each triangle a patch.
+    [[nodiscard]] const RemeshSurface& patches() const { return patches_; }
+    [[nodiscard]] PatchCells cells(size_t patch) const;
+    /// Returns where a patch's corners lie among cells of a step.
+    [[nodiscard]] std::array<glm::ivec3, 3> corners(size_t patch, int step) const;
+
+private:
+    /// By how much a patch with some cells is off.
+    struct Known {
+        PatchCells cells;
+        float height = 0;     ///< most that heights differ, in parts of the range, were it not for jumps
+        float jump = 0;       ///< most by which a corner of a triangle is higher than the patch's own map
+        float across = 0;     ///< most of the covariance, world units
+        bool isWhole = true;  ///< false: it is more than that
+    };
+    /// What a view makes of errors: pixels are (perHeight height + perUnit across) / (depth - nearer |error|).
+    struct Seen {
+        bool is = false;
+        bool canKeep = false;           ///< what is allowed, with even cells
+        int widest = 0, narrowest = 0;  ///< steps of the cells that it may have
+        int pixel = 0;                  ///< step of cells of options.cell pixels
+        double perHeight = 0, perUnit = 0, depth = 1, nearer = 0;
+    };
+    struct View;
+
+    void addEdges();
+    void measureCorners();
+    [[nodiscard]] Seen seenIn(const View& view, size_t patch) const;
+    [[nodiscard]] double pixels(const Seen& seen, double height, double across) const;
+    [[nodiscard]] PatchCells evenly(size_t patch, int step) const;
+    void limitSteps(const View& view, size_t patch, Seen& seen) const;
+    /// Returns the coarsest step that keeps what is allowed, and sets whether one does; else that of a pixel.
+    int wantedStep(size_t patch, Seen& seen, double allowed);
+    /// Returns what is known of a patch's error, exactly where it is at most `allowed` pixels.
+    Known& known(size_t patch, const Seen& seen, const PatchCells& cells, double allowed);
+    void measure(size_t patch, Known& known, double enough);
+    bool keeps(size_t patch, const Seen& seen, const PatchCells& cells, double allowed);
+    void refine(size_t patch, std::vector<uint32_t>& open);
+
+    RemeshSurface patches_;
+    int finest_ = 0;                                   ///< the finest cells are 1 / 2^finest texels wide
+    int coarsest_ = 0;                                 ///< step of cells as wide as a patch
+    std::vector<std::array<glm::ivec2, 3>> grids_;     ///< of each patch's corners among the finest cells
+    std::vector<std::array<uint32_t, 3>> edges_;       ///< of each patch, from corner k to the next
+    std::vector<std::array<uint32_t, 2>> neighbours_;  ///< of each edge: one or two patches
+    std::vector<int> edgeParts_, edgeSteps_;           ///< of each edge, parts among the finest cells
+    std::vector<double> heights_;                      ///< of the corners
+    std::vector<std::vector<Known>> known_;            ///< of each patch
+    std::vector<Seen> seen_;
+    RemeshMesh<double> swept_;  ///< kept for its memory
+};
+
+/// Adds the surface's triangles with cells of the map to a mesh. Errors: as remesh().
+template <class Real>
+Result<void> remesh(CertifiedCells& cells, const RemeshCamera& camera, const RemeshOptions& options,
+                    RemeshMesh<Real>& mesh, uint64_t mostVertices = uint64_t{1} << 26);
+
+extern template Result<void> remesh(CertifiedCells&, const RemeshCamera&, const RemeshOptions&, RemeshMesh<float>&,
+                                    uint64_t);
+extern template Result<void> remesh(CertifiedCells&, const RemeshCamera&, const RemeshOptions&, RemeshMesh<double>&,
+                                    uint64_t);
+
+}  // namespace vcp::meso

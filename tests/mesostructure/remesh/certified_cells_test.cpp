@@ -1,0 +1,333 @@
+// Cells with a certified error: nothing in the picture is farther off than is allowed, nothing gapes, and the choice is
+// the view's alone.
+#include "mesostructure/remesh/certified_cells.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <set>
+
+#include <gtest/gtest.h>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+
+#include "mesostructure/solids.h"
+#include "tests/support/remeshed_views.h"
+
+namespace vcp::meso {
+namespace {
+
+using glm::dvec2, glm::dvec3;
+using test::lookFrom, test::openEdges;
+
+RemeshSurface surfaceOf(std::string_view base, double tiles, double height, std::string_view heights, int texels = 64) {
+    auto levels = std::make_shared<HeightLevels>(
+        *HeightLevels::build(*makeHeightField(heights, texels, 1), {.fit = LevelFit::Averaged}));
+    return *buildRemeshSurface(*makeBaseSurface(base, tiles), std::move(levels), height);
+}
+
+CertifiedCells cellsOf(const RemeshSurface& surface) {
+    auto made = CertifiedCells::create(surface);
+    EXPECT_TRUE(made.ok()) << made.error().line();
+    return *std::move(made);
+}
+
+template <class Real>
+RemeshMesh<Real> meshOf(CertifiedCells& cells, const RemeshCamera& camera, const RemeshOptions& options) {
+    RemeshMesh<Real> mesh;
+    const auto made = remesh(cells, camera, options, mesh);
+    EXPECT_TRUE(made.ok()) << made.error().line();
+    return mesh;
+}
+
+double cross(dvec2 a, dvec2 b) { return a.x * b.y - a.y * b.x; }
+
+/// The displaced surface, in double precision: no two triangles of its base have a place of the map in common.
+class Truth {
+public:
+    Truth(const RemeshSurface& surface, const RemeshCamera& camera) : surface_(surface), camera_(camera) {
+        for (const auto& uvs : surface.uvs)
+            for (const glm::vec2 uv : uvs) low_ = glm::min(low_, dvec2(uv)), high_ = glm::max(high_, dvec2(uv));
+        for (size_t i = 0; i < surface.triangles.size(); ++i) {
+            const auto& uvs = surface.uvs[i];
+            const glm::ivec2 from = binOf(glm::min(uvs[0], glm::min(uvs[1], uvs[2]))),
+                             to = binOf(glm::max(uvs[0], glm::max(uvs[1], uvs[2])));
+            for (int y = from.y; y <= to.y; ++y)
+                for (int x = from.x; x <= to.x; ++x) bins_[size_t(x + kBins * y)].push_back(i);
+        }
+    }
+
+    /// Returns the base triangle at a place; -1: none.
+    [[nodiscard]] int triangleAt(dvec2 uv) const {
+        const glm::ivec2 bin = binOf(uv);
+        for (const size_t i : bins_[size_t(bin.x + kBins * bin.y)]) {
+            const dvec3 w = weights(i, uv);
+            if (w.x > 0 && w.y > 0 && w.z > 0) return int(i);
+        }
+        return -1;
+    }
+    /// Returns a place of a base triangle, displaced, in eye space.
+    [[nodiscard]] dvec3 at(size_t triangle, dvec2 uv) const {
+        const dvec3 w = weights(triangle, uv);
+        dvec3 p = surface_.origin - camera_.eye;
+        const double height = surface_.heights->height(0, uv);
+        for (int k = 0; k < 3; ++k) {
+            const uint32_t corner = surface_.triangles[triangle][size_t(k)];
+            p += w[k] * (dvec3(surface_.positions[corner]) + height * dvec3(surface_.directions[corner]));
+        }
+        return {glm::dot(p, camera_.right), glm::dot(p, camera_.up), glm::dot(p, camera_.forward)};
+    }
+
+private:
+    static constexpr int kBins = 64;
+    [[nodiscard]] glm::ivec2 binOf(dvec2 uv) const {
+        return glm::clamp(glm::ivec2((uv - low_) / (high_ - low_) * double(kBins)), 0, kBins - 1);
+    }
+    [[nodiscard]] dvec3 weights(size_t triangle, dvec2 uv) const {
+        const auto& uvs = surface_.uvs[triangle];
+        const dvec2 a(uvs[0]), b = dvec2(uvs[1]) - a, c = dvec2(uvs[2]) - a;
+        const double area = cross(b, c), y = cross(uv - a, c) / area, z = cross(b, uv - a) / area;
+        return {1 - y - z, y, z};
+    }
+
+    const RemeshSurface& surface_;
+    const RemeshCamera& camera_;
+    dvec2 low_{1e300}, high_{-1e300};
+    std::array<std::vector<size_t>, kBins * kBins> bins_;
+};
+
+/// Returns by how many pixels the mesh is off, at most, over places of all triangles of which either is seen.
+double measured(const RemeshMesh<double>& mesh, const RemeshSurface& surface, const RemeshCamera& camera,
+                double nearest = 0) {
+    const Truth truth(surface, camera);
+    const auto project = [&](dvec3 p) { return dvec2(p) / (camera.isParallel ? 1 : p.z); };
+    const auto isSeen = [&](dvec3 p) {
+        if (!(p.z >= std::max(camera.nearest, nearest))) return false;
+        const dvec2 at = project(p);
+        return at.x >= camera.seen.x && at.y >= camera.seen.y && at.x <= camera.seen.z && at.y <= camera.seen.w;
+    };
+    double most = 0;
+    for (size_t i = 0; i < mesh.indices.size(); i += 3) {
+        const auto &a = mesh.vertices[mesh.indices[i]], &b = mesh.vertices[mesh.indices[i + 1]],
+                   &c = mesh.vertices[mesh.indices[i + 2]];
+        if (std::abs(cross(b.uv - a.uv, c.uv - a.uv)) < 1e-12) continue;
+        const int triangle = truth.triangleAt((a.uv + b.uv + c.uv) / 3.0);
+        if (triangle < 0) continue;
+        constexpr int kParts = 4;
+        for (int k = 0; k <= kParts; ++k)
+            for (int l = 0; k + l <= kParts; ++l) {
+                const dvec3 w(double(k) / kParts, double(l) / kParts, double(kParts - k - l) / kParts);
+                const dvec3 on = w.x * a.position + w.y * b.position + w.z * c.position;
+                const dvec3 there = truth.at(size_t(triangle), w.x * a.uv + w.y * b.uv + w.z * c.uv);
+                if (!isSeen(on) && !isSeen(there)) continue;
+                most = std::max(most, camera.focal * glm::distance(project(on), project(there)));
+            }
+    }
+    return most;
+}
+
+struct Case {
+    const char* base;
+    double tiles, height;
+    const char* heights;
+};
+// Their maps jump nowhere.
+constexpr Case kCases[] = {{"quad", 1, 0.3, "ridged"}, {"quad", 2, 0.02, "blocks"}, {"torus", 3, 0.1, "fbm"}};
+
+TEST(CertifiedCells, NothingIsFartherOffThanCertified) {
+    double tightest = 0;
+    for (const Case& c : kCases) {
+        const RemeshSurface surface = surfaceOf(c.base, c.tiles, c.height, c.heights);
+        CertifiedCells cells = cellsOf(surface);
+        for (const double allowed : {0.5, 3.0})
+            for (const double distance : {1.2, 30.0})
+                for (const bool isParallel : {false, true}) {
+                    SCOPED_TRACE(std::string(c.base) + " " + c.heights + " from " + std::to_string(distance) +
+                                 (isParallel ? ", parallel, " : ", ") + std::to_string(allowed));
+                    RemeshCamera camera = lookFrom(glm::normalize(dvec3(0.6, 0.8, 0.9)) * (1 + distance), {}, 500);
+                    if (isParallel) camera.isParallel = true, camera.focal = 250 / distance, camera.seen *= distance;
+                    const auto mesh = meshOf<double>(cells, camera, {.cell = 1000, .errorPixels = allowed});
+                    EXPECT_EQ(mesh.counts.uncertified, 0u);
+                    EXPECT_LE(mesh.counts.boundPixels, allowed);
+                    const double most = measured(mesh, surface, camera);
+                    EXPECT_LE(most, mesh.counts.boundPixels + 1e-4);
+                    tightest = std::max(tightest, most / mesh.counts.boundPixels);
+                }
+    }
+    // The bound is no idle one.
+    EXPECT_GT(tightest, 0.8);
+}
+
+/// Eyes over the ground, close to it: patches through the eye's plane, and some too near to be certified.
+TEST(CertifiedCells, WhatIsCertifiedHoldsFromWithin) {
+    const RemeshSurface surface = surfaceOf("quad", 1, 0.2, "ridged");
+    CertifiedCells cells = cellsOf(surface);
+    for (const double above : {0.02, 0.1, 0.3}) {
+        SCOPED_TRACE(above);
+        const double ground = 0.2 * surface.heights->height(0, dvec2(0.4, 0.55));
+        RemeshCamera camera = lookFrom({-0.2, 0.1, ground + above}, {1, 0.1, 0.1}, 300);
+        const auto mesh = meshOf<double>(cells, camera, {.errorPixels = 0.5});
+        EXPECT_LE(mesh.counts.boundPixels, 0.5);
+        EXPECT_LT(mesh.counts.uncertified, 12u);
+        // A patch is 1/2 wide and may be uncertified where the eye is within the box about it.
+        EXPECT_LE(measured(mesh, surface, camera, 0.75), 0.5);
+        EXPECT_LT(mesh.vertices.size(), 400'000u);
+    }
+}
+
+TEST(CertifiedCells, ClosedSurfacesStayClosed) {
+    uint64_t mixed = 0;
+    for (const Case& c : {Case{"sphere", 1.5, 0.2, "blocks"}, Case{"torus", 2.7, 0.1, "ridged"},
+                          Case{"box", 2, 0.3, "fbm"}, Case{"torus", 12, 0.02, "fbm"}}) {
+        const RemeshSurface surface = surfaceOf(c.base, c.tiles, c.height, c.heights);
+        CertifiedCells cells = cellsOf(surface);
+        for (int frame = 0; frame < 6; ++frame) {
+            SCOPED_TRACE(std::string(c.base) + " " + std::to_string(frame));
+            RemeshCamera camera = lookFrom(glm::normalize(dvec3(1, 0.1 * frame, 0.7)) * (1.9 + 0.7 * frame), {}, 120);
+            // All of it is seen, so that none of it is culled; but of one half of it more is known.
+            camera.seen = frame % 2 == 0 ? glm::dvec4(-1e9, -1e9, 1e9, 1e9) : glm::dvec4(-9, -9, 9, 9);
+            camera.picture = glm::dvec4(-0.5, -0.5, 0, 0.5);
+            const auto mesh = meshOf<float>(cells, camera, {.cell = 1000, .errorPixels = 0.7});
+            if (mesh.counts.culled > 0) continue;
+            EXPECT_EQ(openEdges(mesh), 0u);
+            EXPECT_GT(mesh.vertices.size(), 100u);
+            for (size_t i = 0; i < cells.patches().triangles.size(); ++i) {
+                const glm::ivec3 parts = cells.cells(i).parts;
+                mixed += std::max({parts.x, parts.y, parts.z}) >= 4 * std::min({parts.x, parts.y, parts.z});
+            }
+        }
+    }
+    EXPECT_GT(mixed, 100u);
+}
+
+TEST(CertifiedCells, LargerErrorsMakeFewerTriangles) {
+    const RemeshSurface surface = surfaceOf("quad", 2, 0.2, "fbm", 256);
+    CertifiedCells cells = cellsOf(surface);
+    const RemeshCamera camera = lookFrom({1.2, 1.6, 1.4}, {0, 0, 0}, 600);
+    size_t before = ~size_t{0};
+    for (const double allowed : {0.25, 0.5, 1.0, 2.0}) {
+        const auto mesh = meshOf<float>(cells, camera, {.cell = 1000, .errorPixels = allowed});
+        EXPECT_LT(mesh.indices.size(), before * 3 / 4) << allowed;
+        before = mesh.indices.size();
+    }
+    // The widest cell is kept, too.
+    const auto coarse = meshOf<float>(cells, camera, {.cell = 1000, .errorPixels = 4}),
+               fine = meshOf<float>(cells, camera, {.cell = 4, .errorPixels = 4});
+    EXPECT_GT(fine.indices.size(), 2 * coarse.indices.size());
+}
+
+/// A map that is flat but for one corner needs cells there alone.
+TEST(CertifiedCells, CellsAreFineWhereTheMapIsSteep) {
+    HeightMap map{{256, 256}, 1, std::vector<uint16_t>(256 * 256, 1000)};
+    for (int j = 100; j < 120; ++j)
+        for (int i = 40; i < 60; ++i) map.texels[size_t(i + 256 * j)] = uint16_t((i * 7919 + j * 104729) % 65536);
+    auto levels = std::make_shared<HeightLevels>(*HeightLevels::build(map, {.fit = LevelFit::Averaged}));
+    const RemeshSurface surface = *buildRemeshSurface(*makeBaseSurface("quad", 1), std::move(levels), 0.1);
+    CertifiedCells cells = cellsOf(surface);
+    const RemeshCamera camera = lookFrom({0.5, 0.6, 2}, {0, 0, 0}, 600);
+    const auto mesh = meshOf<double>(cells, camera, {.cell = 1000, .errorPixels = 0.5});
+    size_t inside = 0;
+    for (const auto& vertex : mesh.vertices)
+        inside += vertex.uv.x > 0.1 && vertex.uv.x < 0.3 && vertex.uv.y > 0.35 && vertex.uv.y < 0.5;
+    EXPECT_GT(inside, 500u);
+    EXPECT_GT(inside, mesh.vertices.size() * 4 / 5);
+    EXPECT_LE(measured(mesh, surface, camera), 0.5);
+}
+
+TEST(CertifiedCells, TheChoiceIsTheViewsAlone) {
+    const RemeshSurface surface = surfaceOf("torus", 4, 0.05, "fbm", 32);
+    CertifiedCells cells = cellsOf(surface), fresh = cellsOf(surface);
+    const RemeshOptions options{.cell = 3, .errorPixels = 0.5};
+    const RemeshCamera camera = lookFrom({3, 2, 2.5}, {0, 0, 0}, 300);
+    for (int i = 0; i < 70; ++i)
+        static_cast<void>(meshOf<float>(cells, lookFrom({3 - 0.05 * i, 2, 2.5}, {0, 0.01 * i, 0}, 150), options));
+    const auto a = meshOf<float>(cells, camera, options), b = meshOf<float>(fresh, camera, options);
+    EXPECT_EQ(a.indices, b.indices);
+    EXPECT_EQ(a.counts.boundPixels, b.counts.boundPixels);
+}
+
+/// Triangles of tiles are the picture's.
+TEST(CertifiedCells, TilesOfAPictureAgree) {
+    const RemeshSurface surface = surfaceOf("sphere", 3, 0.1, "ridged");
+    CertifiedCells cells = cellsOf(surface);
+    RemeshCamera camera = lookFrom({3, 2, 2.5}, {0, 0, 0}, 300);
+    const RemeshOptions options{.cell = 4, .errorPixels = 0.5};
+    const auto triangles = [&] {
+        std::set<std::array<std::array<float, 3>, 3>> all;
+        const auto mesh = meshOf<float>(cells, camera, options);
+        for (size_t i = 0; i < mesh.indices.size(); i += 3) {
+            std::array<std::array<float, 3>, 3> corners;
+            for (size_t k = 0; k < 3; ++k) {
+                const auto& p = mesh.vertices[mesh.indices[i + k]].position;
+                corners[k] = {p.x, p.y, p.z};
+            }
+            all.insert(corners);
+        }
+        return all;
+    };
+    const auto whole = triangles();
+    camera.picture = camera.seen;
+    size_t sum = 0;
+    for (const double left : {-0.6, 0.0}) {
+        camera.seen.x = left, camera.seen.z = left + 0.6;
+        const auto tile = triangles();
+        sum += tile.size();
+        EXPECT_TRUE(std::ranges::includes(whole, tile));
+        EXPECT_LT(tile.size(), whole.size());
+    }
+    EXPECT_GE(sum, whole.size());
+}
+
+/// Along the rims of a cylinder, and where 1.3 tiles go round it, the map jumps: no cells take that away.
+TEST(CertifiedCells, JumpsOfTheMapAreNotRefinedForever) {
+    const RemeshSurface surface = surfaceOf("cylinder", 1.3, 0.3, "fbm");
+    CertifiedCells cells = cellsOf(surface);
+    const RemeshCamera camera = lookFrom({3, 2, 2.5}, {0, 0, 0}, 500);
+    const auto mesh = meshOf<float>(cells, camera, {.cell = 4, .errorPixels = 0.5});
+    EXPECT_GT(mesh.counts.uncertified, 10u);
+    EXPECT_LT(mesh.counts.uncertified, cells.patches().triangles.size() / 2);
+    EXPECT_LE(mesh.counts.boundPixels, 0.5);
+    EXPECT_LT(mesh.vertices.size(), 200'000u);
+    EXPECT_EQ(openEdges(mesh), 0u);
+}
+
+/// A tetrahedron of which each face has a map of its own, with other texels along the edges than its neighbours.
+TEST(CertifiedCells, SeamsOfOtherTexelsStayClosed) {
+    const BaseSurface base{{{1, 1, 1}, {-1, -1, 1}, {-1, 1, -1}, {1, -1, -1}},
+                           {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}},
+                           {{dvec2(0, 0), dvec2(0.5, 0), dvec2(0, 0.5)},
+                            {dvec2(0.6, 0.6), dvec2(0.7, 0.6), dvec2(0.6, 0.63)},
+                            {dvec2(0.1, 0.9), dvec2(0.9, 0.93), dvec2(0.4, 0.1)},
+                            {dvec2(0.31, 0.2), dvec2(0.3, 0.9), dvec2(0.9, 0.3)}}};
+    auto levels = std::make_shared<HeightLevels>(*HeightLevels::build(*makeHeightField("fbm", 128, 1)));
+    const RemeshSurface surface = *buildRemeshSurface(base, std::move(levels), 0.3);
+    EXPECT_EQ(surface.seamUvs.size(), 12u);
+    CertifiedCells cells = cellsOf(surface);
+    for (const double distance : {3.0, 6.0, 60.0}) {
+        const auto mesh = meshOf<float>(cells, lookFrom(glm::normalize(dvec3(0.3, 0.8, 0.5)) * distance, {}, 400),
+                                        {.errorPixels = 0.5});
+        ASSERT_EQ(mesh.counts.culled, 0u);
+        EXPECT_EQ(openEdges(mesh), 0u) << distance;
+    }
+}
+
+TEST(CertifiedCells, RefuseWhatTheyCannotCut) {
+    BaseSurface base{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}, {{dvec2(0), dvec2(1e12, 0), dvec2(0, 1e12)}}};
+    auto levels = std::make_shared<HeightLevels>(*HeightLevels::build(*makeHeightField("fbm", 16, 1)));
+    const auto refused = CertifiedCells::create(*buildRemeshSurface(base, std::move(levels), 0.2));
+    ASSERT_FALSE(refused.ok());
+    EXPECT_EQ(refused.error().code, ErrorCode::Limit);
+    const RemeshSurface surface = surfaceOf("quad", 1, 0.2, "fbm");
+    CertifiedCells cells = cellsOf(surface);
+    RemeshMesh<float> mesh;
+    for (const double wrong : {-1.0, std::nan(""), HUGE_VAL})
+        EXPECT_EQ(remesh(cells, lookFrom({1, 1, 1}, {}, 100), {.errorPixels = wrong}, mesh).error().code,
+                  ErrorCode::Usage);
+    EXPECT_EQ(remesh(cells, lookFrom({1, 1, 1}, {}, 100), {.cell = 0, .errorPixels = 1}, mesh).error().code,
+              ErrorCode::Usage);
+    EXPECT_EQ(remesh(cells, lookFrom({1, 1, 1}, {}, 400), {.errorPixels = 0.01}, mesh, 1000).error().code,
+              ErrorCode::Limit);
+}
+
+}  // namespace
+}  // namespace vcp::meso
