@@ -1,0 +1,31 @@
+// How the base surfaces of a scene shade and light each other, as light from everywhere has it
+// (mesostructure/base_transfer.h): the rays are the builder's own.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "mesostructure/base_surface.h"
+#include "mesostructure/base_transfer.h"
+#include "mesostructure/shape.h"
+
+namespace vcp {
+
+/// A base surface among those that shade each other.
+struct SceneBase {
+    meso::BaseSurface surface;  ///< world
+    double height = 0;          ///< of its mesostructure on the mean, over the base, world units
+    double albedo = 0;          ///< of its mesostructure as a whole (meso::TileReflection)
+    bool isAsked = false;       ///< its transfer is wanted
+};
+/// Returns a base and what its mesostructure does. `slab`: height of the slab, `offset`: of its bottom over the base;
+/// world units. `albedo`: of the walls.
+SceneBase sceneBase(meso::BaseSurface surface, const meso::Shape& shape, double slab, double offset, double albedo);
+
+/// Traces the transfer of the bases that ask for it; null for others. `progress` may be empty; false cancels. Errors:
+/// those of meso::traceBaseTransfer.
+Result<std::vector<std::shared_ptr<const meso::BaseTransfer>>> traceBases(
+    const std::vector<SceneBase>& bases, const std::function<bool(double part)>& progress = {});
+
+}  // namespace vcp
