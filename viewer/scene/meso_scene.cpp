@@ -13,6 +13,7 @@
 #include "mesostructure/solids.h"
 #include "viewer/scene/base_light.h"
 #include "viewer/scene/base_mesh.h"
+#include "viewer/scene/mesh_cache.h"
 #include "viewer/scene/tile_texture.h"
 
 namespace vcp {
@@ -149,7 +150,8 @@ public:
     /// Gives its transfer to each surface that asks for it.
     void trace(std::span<const MesoSurfaceDescription> descriptions, MesoScene& scene) const {
         if (bases_.empty()) return;
-        const auto traced = traceBases(bases_);
+        const auto cache = defaultCacheFolder();
+        const auto traced = traceBases(bases_, cache ? *cache : std::filesystem::path());
         if (!traced) {
             scene.warnings.push_back(traced.error().message + "; the bases do not shade each other");
             return;
