@@ -21,7 +21,6 @@ using Row = std::array<double, 16>;
 
 constexpr double kLift = 1e-6;          // by which rays start above a base, parts of the scene's diagonal
 constexpr double kSteadiness = 1e-5;    // that is added to the least squares' diagonal, whose largest is near 0.1
-constexpr double kBuried = 0.25;        // part of a vertex' rays that meet backs, from which on it lies within a base
 constexpr double kBounceIsOver = 1e-4;  // of what a white surface gives back, at most, by one more bounce
 
 /// Weighs the rays over a hemisphere so that sums of what they bring are coefficients (the inverse of the harmonics'
@@ -91,51 +90,6 @@ public:
         std::copy(open.c, open.c + 16, own_[vertex].begin());
     }
 
-    /// Finds vertices that lie within a base: where parts of a base pass through each other, say. What is over them
-    /// nobody sees, but the triangles that they share with what is seen do: they get the mean of their neighbours'
-    /// light, from the border inwards. Where all of a part is within, it stays dark.
-    void findBuried() {
-        std::vector<uint8_t> isBuried(blocked_.size());
-        for (size_t v = 0; v < blocked_.size(); ++v) {
-            const auto backs = std::ranges::count_if(blocked_[v], [&](const Blocked& b) { return isBack(b, v); });
-            isBuried[v] = double(backs) > kBuried * options_.rays;
-        }
-        std::vector<std::vector<uint32_t>> neighbours(blocked_.size());
-        for (const auto& t : scene_.triangles)
-            for (size_t k = 0; k < 3; ++k)
-                if (isBuried[t[k]])
-                    for (const size_t other : {(k + 1) % 3, (k + 2) % 3}) neighbours[t[k]].push_back(t[other]);
-        for (bool isFinding = true; isFinding;) {
-            std::vector<Filled> layer;
-            for (uint32_t v = 0; v < isBuried.size(); ++v) {
-                if (!isBuried[v]) continue;
-                std::erase_if(neighbours[v], [&](uint32_t n) { return n == v; });
-                Filled filled{v, {}};
-                for (const uint32_t n : neighbours[v])
-                    if (!isBuried[n]) filled.from.push_back(n);
-                if (!filled.from.empty()) layer.push_back(std::move(filled));
-            }
-            for (const Filled& each : layer) isBuried[each.vertex] = 0;
-            isFinding = !layer.empty();
-            filled_.insert(filled_.end(), layer.begin(), layer.end());
-        }
-        for (const Filled& each : filled_) blocked_[each.vertex].clear();
-        fill(own_, 0);
-    }
-
-    /// Gives vertices that lie within a base what their neighbours have. `values`: of the vertices from `first` on.
-    template <class Values>
-    void fill(std::vector<Values>& values, size_t first) const {
-        for (const Filled& each : filled_) {
-            if (each.vertex < first || each.vertex >= first + values.size()) continue;
-            Values mean{};
-            for (const uint32_t from : each.from)
-                for (size_t k = 0; k < mean.size(); ++k)
-                    mean[k] += values[from - first][k] / typename Values::value_type(each.from.size());
-            values[each.vertex - first] = mean;
-        }
-    }
-
     /// Follows light from base to base; then `lit` is what each vertex gets, over what falls on an open one.
     void bounce() {
         lit_ = own_;
@@ -147,11 +101,9 @@ public:
                     const Row from = givenBack(blocked, v);
                     for (size_t k = 0; k < 16; ++k) next[v][k] += from[k] / options_.rays;
                 }
-            }
-            fill(next, 0);
-            // Under light of radiance 1 from everywhere.
-            for (size_t v = 0; v < next.size(); ++v)
+                // Under light of radiance 1 from everywhere.
                 most = std::max(most, std::abs(next[v][0] - lit_[v][0]) / f64::kBand0);
+            }
             lit_ = std::move(next);
             if (most < kBounceIsOver) break;
         }
@@ -178,6 +130,8 @@ public:
         return made;
     }
 
+    [[nodiscard]] bool isOpen(size_t vertex) const { return blocked_[vertex].empty(); }
+
 private:
     static glm::dmat3 frameOf(dvec3 n) {
         return {turnedFromZ(n, {1, 0, 0}), turnedFromZ(n, {0, 1, 0}), turnedFromZ(n, {0, 0, 1})};
@@ -196,19 +150,13 @@ private:
         return {hit.triangle, uint16_t(ray), {uint16_t(65535 * second), uint16_t(65535 * third)}};
     }
 
-    /// Whether a vertex' ray meets the back of a triangle.
-    [[nodiscard]] bool isBack(const Blocked& blocked, size_t vertex) const {
-        const auto& t = scene_.triangles[blocked.triangle];
-        const dvec3 a = scene_.positions[t[0]],
-                    normal = glm::cross(scene_.positions[t[1]] - a, scene_.positions[t[2]] - a);
-        return glm::dot(frameOf(scene_.normals[vertex]) * directions_[blocked.ray], normal) >= 0;
-    }
-
     /// Returns what comes back from where a ray meets a base.
     [[nodiscard]] Row givenBack(const Blocked& blocked, size_t vertex) const {
         Row row{};
-        if (isBack(blocked, vertex)) return row;
         const auto& t = scene_.triangles[blocked.triangle];
+        const dvec3 a = scene_.positions[t[0]],
+                    normal = glm::cross(scene_.positions[t[1]] - a, scene_.positions[t[2]] - a);
+        if (glm::dot(frameOf(scene_.normals[vertex]) * directions_[blocked.ray], normal) >= 0) return row;
         const double second = blocked.weights[0] / 65535.0, third = blocked.weights[1] / 65535.0;
         const double weights[] = {1 - second - third, second, third};
         for (size_t corner = 0; corner < 3; ++corner)
@@ -224,12 +172,6 @@ private:
     std::vector<Harmonics> harmonics_;  // of them
     std::vector<Harmonics> fit_;        // what each ray adds to the coefficients
     std::vector<std::vector<Blocked>> blocked_;
-    /// A vertex within a base, and the neighbours that it gets its light from.
-    struct Filled {
-        uint32_t vertex;
-        std::vector<uint32_t> from;
-    };
-    std::vector<Filled> filled_;  // those that others get it from come first
     std::vector<Row> own_, lit_;  // what a white flat surface gives back: straight from the surroundings; all of it
 };
 
@@ -307,17 +249,14 @@ Result<std::vector<BaseTransfer>> traceBaseTransfer(const BaseScene& scene,
         for (size_t v = first; v < last; ++v) tracer.cast(v);
     });
     if (!isCast) return Error::cancelled();
-    tracer.findBuried();
     tracer.bounce();
     std::vector<BaseTransfer> made;
     for (const auto& [first, count] : ranges) {
         BaseTransfer& transfer = made.emplace_back();
-        std::vector<std::array<float, BaseTransfer::kValues>> changes;
-        for (uint32_t v = first; v < first + count; ++v) changes.push_back(tracer.changeAt(v));
-        tracer.fill(changes, first);
-        for (const auto& change : changes) {
+        for (uint32_t v = first; v < first + count; ++v) {
             transfer.numbers.push_back(0);
-            if (std::ranges::all_of(change, [](float value) { return value == 0; })) continue;
+            if (tracer.isOpen(v)) continue;
+            const auto change = tracer.changeAt(v);
             transfer.changes.insert(transfer.changes.end(), change.begin(), change.end());
             transfer.numbers.back() = uint32_t(transfer.changes.size() / BaseTransfer::kValues);
         }

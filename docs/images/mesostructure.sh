@@ -42,13 +42,6 @@ for way in open transfer; do
         draw light_$way '{"asset": "beads.meso", "tiles": 2, '"$keys$clay}" --size 360x270 --camera 30,35,1.6
 done
 
-# Beads on the teapot under an even sky: as if its parts did not see each other, and as they do.
-for base in false true; do
-    rest='"environment": {"source": "overcast"}' \
-        draw light_base_$base '{"asset": "beads.meso", "surface": "teapot", "tiles": 6, "transfer": true, "base_transfer": '$base", $clay}" \
-        --size 360x270 --camera 30,30,1.6
-done
-
 # Beads on a dog of 40 000 triangles.
 "$build/make_scan" --shape dog --triangles 40k -o "$scratch/dog.obj"
 cp "$images/../scenes/beads_dog.json" "$scratch"

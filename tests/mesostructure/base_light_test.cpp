@@ -138,24 +138,6 @@ TEST(BaseTransfer, KeepsTheLightOfAFlatSurface) {
     }
 }
 
-TEST(BaseTransfer, WhatLiesWithinABaseIsNotDark) {
-    // A floor that goes on within a long box: its triangles are seen up to the box, and blend what their corners have.
-    std::vector<dvec2> line;
-    for (int i = 0; i <= 8; ++i) line.emplace_back(0.5 * i, 0);
-    BaseScene scene;
-    scene.add(extruded(line, 300), 0, 0.5);
-    BaseSurface box = *makeBaseSurface("box", 2);
-    for (dvec3& p : box.positions) p = dvec3(3.75, 0, 0) + p * dvec3(1.5, 400, 1);
-    scene.add(box, 0, 0.5);
-    const BaseTransfer transfer = transferOf(scene, {.rays = 256});
-    const auto lightAt = [&](int i) {
-        return dot(f64::clampedCosine({0, 0, 1}), lightOver(transfer, size_t(3 * i + 1), evenLight()));
-    };
-    EXPECT_GT(lightAt(0), lightAt(4));
-    EXPECT_GT(lightAt(4), 0.6);
-    for (int i = 5; i <= 8; ++i) EXPECT_NEAR(lightAt(i), lightAt(4), 0.04) << i;
-}
-
 TEST(BaseTransfer, GroovesAreAsRadiosityHasThem) {
     constexpr int kStrips = 64;
     std::vector<dvec2> line;
