@@ -20,16 +20,7 @@ using glm::dvec2, glm::dvec3;
 constexpr size_t kMostPieces = size_t{1} << 24;  // numbers of pieces are stored as floats
 constexpr double kLongest = 3;                   // longest direction at an edge, in heights
 
-struct Piece {
-    std::array<dvec3, 4> corners, tile;
-    uint32_t bits = 0;  ///< as Shell::texels has them
-    [[nodiscard]] dvec3 low() const {
-        return glm::min(glm::min(corners[0], corners[1]), glm::min(corners[2], corners[3]));
-    }
-    [[nodiscard]] dvec3 high() const {
-        return glm::max(glm::max(corners[0], corners[1]), glm::max(corners[2], corners[3]));
-    }
-};
+using Piece = ShellPiece;
 
 dvec3 faceNormal(const BaseSurface& surface, size_t triangle) {
     const auto& t = surface.triangles[triangle];
@@ -128,7 +119,8 @@ private:
             Piece made;
             for (int k = 0; k < 4; ++k)
                 made.corners[k] = world[kCorners[piece][k]], made.tile[k] = tile[kCorners[piece][k]];
-            made.bits = bitsOf(kCorners[piece], isCut);
+            made.bits = bitsOf(kCorners[piece], isCut) | uint32_t(piece) << f32::kShellPart;
+            for (int k = 0; k < 3; ++k) made.columns[k] = t[order[k]];
             const dvec3 x = made.corners[1] - made.corners[0], y = made.corners[2] - made.corners[0],
                         z = made.corners[3] - made.corners[0];
             const double volume = glm::dot(glm::cross(x, y), z) * (isOdd ? -1 : 1) * (piece == 1 ? -1 : 1);
@@ -216,7 +208,7 @@ void append(const Piece& piece, dvec3 extent, std::vector<glm::vec4>& texels) {
     const glm::dmat3 r = glm::transpose(weights), t = glm::transpose(map);
     texels.push_back(glm::vec4(piece.corners[0], float(piece.bits)));
     for (int row = 0; row < 3; ++row) texels.push_back(glm::vec4(r[row], q0[row]));
-    for (int row = 0; row < 3; ++row) texels.push_back(glm::vec4(t[row], 0));
+    for (int row = 0; row < 3; ++row) texels.push_back(glm::vec4(t[row], float(piece.columns[row])));
 }
 
 bool isFinite(const BaseSurface& surface) {
@@ -259,6 +251,16 @@ std::vector<dvec3> shellDirections(const BaseSurface& surface) {
     return sums;
 }
 
+std::vector<ShellPiece> shellPieces(const BaseSurface& surface, double height, dvec3 extent, double offset,
+                                    Shell& shell) {
+    dvec3 low(std::numeric_limits<double>::infinity()), high = -low;
+    for (const auto& triangle : surface.triangles)
+        for (const uint32_t corner : triangle)
+            low = glm::min(low, surface.positions[corner]), high = glm::max(high, surface.positions[corner]);
+    if (!surface.triangles.empty()) shell.origin = 0.5 * (low + high);
+    return PieceMaker(surface, height, extent, offset, shell).all();
+}
+
 Result<Shell> buildShell(const BaseSurface& surface, double height, dvec3 extent, double offset) {
     const auto fail = [](ErrorCode code, const char* message) { return Error{.code = code, .message = message}; };
     if (!(height > 0) || !std::isfinite(height) || !(extent.z > 0))
@@ -270,12 +272,7 @@ Result<Shell> buildShell(const BaseSurface& surface, double height, dvec3 extent
         return fail(ErrorCode::Limit, "a base surface has at most 5 592 405 triangles");
     if (!isFinite(surface)) return fail(ErrorCode::InvalidInput, "positions and texture coordinates must be finite");
     Shell shell;
-    dvec3 low(std::numeric_limits<double>::infinity()), high = -low;
-    for (const auto& triangle : surface.triangles)
-        for (const uint32_t corner : triangle)
-            low = glm::min(low, surface.positions[corner]), high = glm::max(high, surface.positions[corner]);
-    if (!surface.triangles.empty()) shell.origin = 0.5 * (low + high);
-    const std::vector<Piece> pieces = PieceMaker(surface, height, extent, offset, shell).all();
+    const std::vector<Piece> pieces = shellPieces(surface, height, extent, offset, shell);
     if (pieces.empty())
         return fail(ErrorCode::InvalidInput, shell.flat > 0
                                                  ? "all faces lie on their own backs: the surface has no outside"

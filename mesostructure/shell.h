@@ -12,9 +12,11 @@
 // tetrahedra without volume, which are left out: where faces lie on their own backs there is no outside.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
+#include <glm/common.hpp>
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
 
@@ -36,9 +38,10 @@ struct Shell {
     /// `nodes` nodes, then `pieces` tetrahedra, as shaders read them:
     ///   node    (low, first child or first piece) (high, pieces; 0: two children, one after the other)
     ///   piece   (v0, bits: 1 << i where the face opposite corner i is cut, kBase where the one opposite the last is
-    ///   the base)
+    ///   the base, and its part, f32::kShellPart)
     ///           3 x (row of R, coordinate of q0)    weights of corners 1 to 3 are R (p - v0)
-    ///           3 x (row of T, 0)                   tile space is q0 + T (p - v0); q0 is in the first tile
+    ///           3 x (row of T, position's number)   tile space is q0 + T (p - v0); q0 is in the first tile; the
+    ///           positions of its prism's columns
     /// A face is cut where it is on a border of the base, or where the map jumps: solid shows its cut there.
     static constexpr uint32_t kBase = f32::kShellBaseFace;
     std::vector<glm::vec4> texels;
@@ -49,6 +52,24 @@ struct Shell {
 /// (heights not above 0, an offset that is not finite, not a map of each triangle); InvalidInput (no triangle with
 /// area, coordinates that are not finite, also in single precision); Limit (2^24 pieces).
 Result<Shell> buildShell(const BaseSurface& surface, double height, glm::dvec3 extent, double offset = 0);
+
+/// A tetrahedron of a shell, in double precision.
+struct ShellPiece {
+    /// As Shell::texels has them; the base's corners are first, each column's from below. World, from Shell::origin.
+    std::array<glm::dvec3, 4> corners, tile;
+    uint32_t bits = 0;                  ///< as Shell::texels has them
+    std::array<uint32_t, 3> columns{};  ///< positions of the base
+    [[nodiscard]] glm::dvec3 low() const {
+        return glm::min(glm::min(corners[0], corners[1]), glm::min(corners[2], corners[3]));
+    }
+    [[nodiscard]] glm::dvec3 high() const {
+        return glm::max(glm::max(corners[0], corners[1]), glm::max(corners[2], corners[3]));
+    }
+};
+/// Returns the pieces that buildShell makes texels of, and fills `shell` with its origin and counts. Preconditions:
+/// those that buildShell checks.
+std::vector<ShellPiece> shellPieces(const BaseSurface& surface, double height, glm::dvec3 extent, double offset,
+                                    Shell& shell);
 
 /// Returns the direction of each position in heights, of at most 3: what a shell's corners are moved along. 0 where the
 /// normals cancel, or where no triangle with area is.

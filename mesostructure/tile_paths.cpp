@@ -66,17 +66,16 @@ TileMeeting TilePaths::see(dvec3 view, dvec2 place) const {
     return meet({place, shape_.extent().z}, -view, std::numeric_limits<double>::infinity());
 }
 
-TileEscape TilePaths::follow(TilePoint from, dvec3 direction, PathRandom& random) const {
+TileEscape followPath(const std::function<TileMeeting(const TilePoint& from, dvec3 direction)>& meet, double albedo,
+                      TilePoint from, dvec3 direction, PathRandom& random) {
     TileEscape escape{direction, 1};
-    // A level ray would pass tile after tile.
-    constexpr double kFarthest = 1000;
     for (int points = 0; points < kMostPoints; ++points) {
-        const TileMeeting met = meet(from.at + kLift * from.normal, escape.direction, kFarthest);
+        const TileMeeting met = meet(from, escape.direction);
         if (met.kind == TileMeeting::Kind::Sky) return escape;
         if (met.kind == TileMeeting::Kind::Unresolved) break;
         if (points < kWeighted)
-            escape.weight *= albedo_;
-        else if (random.next() >= albedo_)
+            escape.weight *= albedo;
+        else if (random.next() >= albedo)
             break;
         from = met.point;
         if (glm::dot(from.normal, escape.direction) > 0) break;
@@ -85,6 +84,15 @@ TileEscape TilePaths::follow(TilePoint from, dvec3 direction, PathRandom& random
     }
     escape.weight = 0;
     return escape;
+}
+
+TileEscape TilePaths::follow(TilePoint from, dvec3 direction, PathRandom& random) const {
+    // A level ray would pass tile after tile.
+    constexpr double kFarthest = 1000;
+    const auto meets = [this](const TilePoint& point, dvec3 towards) {
+        return meet(point.at + kLift * point.normal, towards, kFarthest);
+    };
+    return followPath(meets, albedo_, from, direction, random);
 }
 
 dvec3 TilePaths::lightAt(const TilePoint& point, const std::function<dvec3(dvec3)>& radiance, uint32_t paths,

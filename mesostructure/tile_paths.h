@@ -53,6 +53,12 @@ glm::dvec3 directionByCosine(glm::dvec3 n, glm::dvec2 p);
 /// Returns the unit vector of axes about n in which z is n.
 glm::dvec3 turnedFromZ(glm::dvec3 n, glm::dvec3 local);
 
+/// Follows a path from a point on, and about further points by their cosine. After a few of them it goes on by chance,
+/// with the albedo as its chance, so its mean has no bias (Russian roulette, Arvo and Kirk 1990). `meet`: what the ray
+/// from a point meets.
+TileEscape followPath(const std::function<TileMeeting(const TilePoint& from, glm::dvec3 direction)>& meet,
+                      double albedo, TilePoint from, glm::dvec3 direction, PathRandom& random);
+
 class TilePaths {
 public:
     /// `shape` must outlive this. `albedo`: from 0 to 1.
@@ -65,8 +71,7 @@ public:
     [[nodiscard]] TileMeeting meet(glm::dvec3 from, glm::dvec3 direction, double reach) const;
     /// Returns where a ray against `view` first meets the surface; it enters the slab's top at `place`, tile units.
     [[nodiscard]] TileMeeting see(glm::dvec3 view, glm::dvec2 place) const;
-    /// Follows a path from a point on, and about further points by their cosine. After a few of them it goes on by
-    /// chance, with the albedo as its chance, so its mean has no bias (Russian roulette, Arvo and Kirk 1990).
+    /// As followPath.
     [[nodiscard]] TileEscape follow(TilePoint from, glm::dvec3 direction, PathRandom& random) const;
 
     /// Returns the light that arrives at a point, over what a white, flat, open one gets under light of radiance 1 from

@@ -15,6 +15,7 @@
 #include <glm/matrix.hpp>
 #include <glm/vec4.hpp>
 
+#include "mesostructure/base_transfer.h"
 #include "mesostructure/tile_paths.h"
 
 namespace vcp::meso {
@@ -42,7 +43,7 @@ struct TransferLookup {
 
 #undef INLINE
 
-static_assert(kTransferTexels == TransferVolume::kTexels &&
+static_assert(kTransferTexels == TransferVolume::kTexels && kBaseLightTexels == BaseTransfer::kTexels &&
               uint64_t{kTransferHalf} * kTransferHalf - 1 == TransferVolume::kMostCells);
 
 }  // namespace transfer_f32

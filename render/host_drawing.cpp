@@ -161,11 +161,18 @@ Result<HostPicture> drawOnHost(std::span<const HostDataset> datasets, std::span<
         layers.push_back(layerOf(each, request));
     }
     std::vector<HostSurface> drawn;
+    std::vector<std::vector<uint64_t>> baseLights(surfaces.size());
     for (const PreparedSurface& each : surfaces) {
         const meso::Shell& shell = each.surface->shell;
         drawn.push_back(
-            {*each.surface->arrays, shell, each.look.view, *each.words, each.look.textures, each.look.isFarDrawn});
-        setPicture(drawn.back().view, shell.origin + movedBy(request, drawn.size() - 1), request);
+            {*each.surface->arrays, shell, each.look.view, *each.words, each.look.textures, each.look.isFarDrawn, {}});
+        HostSurface& made = drawn.back();
+        setPicture(made.view, shell.origin + movedBy(request, drawn.size() - 1), request);
+        if (made.view.hasBaseLight != 0 && readsTransfer(request.shading)) {
+            std::vector<uint64_t>& texels = baseLights[drawn.size() - 1];
+            texels = each.surface->baseTransfer->lightTexels(made.view.harmonics);
+            made.baseLight = texels;
+        }
     }
     VCP_TRY(drawLayers(layers, drawn, datasets, request, options, picture));
     if (request.sample == 0) tell(placed, layers, picture);

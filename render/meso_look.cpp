@@ -45,6 +45,7 @@ MesoLook mesoLook(const MesoSurface& surface) {
         const std::vector<uint64_t> texels = meso::transferTexels(*surface.transfer);
         look.looks.insert(look.looks.end(), texels.begin(), texels.end());
     }
+    look.view.hasBaseLight = changesBaseLight(surface) ? 1 : 0;
     // A surface that rays may come through must be marched.
     look.isFarDrawn = surface.far && (surface.withBase || surface.far->isOpaque);
     look.view.meanHeight = look.isFarDrawn ? float(surface.far->height) : 0.0f;
@@ -90,6 +91,10 @@ void setPicture(frame::MesoView& view, glm::dvec3 origin, const FrameRequest& re
     }
     view.strayPixels = float(request.errorPixels), view.farShadows = request.shading.shadows ? 1 : 0;
     view.shows = shownIn(request.shading.mode);
+}
+
+bool changesBaseLight(const MesoSurface& surface) {
+    return surface.transfer && surface.baseTransfer && !surface.baseTransfer->changes.empty();
 }
 
 bool readsTransfer(const Shading& shading) {

@@ -35,6 +35,9 @@ void setRays(frame::MesoView& view, glm::dvec3 origin, const PictureRays& rays);
 /// Fills all that depends on the picture.
 void setPicture(frame::MesoView& view, glm::dvec3 origin, const FrameRequest& request);
 
+/// Whether light from everywhere is another over a surface's base than that of the surroundings.
+bool changesBaseLight(const MesoSurface& surface);
+
 /// Whether pictures show what volumes of transfer say.
 bool readsTransfer(const Shading& shading);
 

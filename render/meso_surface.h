@@ -6,6 +6,7 @@
 #include <glm/vec3.hpp>
 
 #include "mesostructure/appearance.h"
+#include "mesostructure/base_transfer.h"
 #include "mesostructure/march_arrays.h"
 #include "mesostructure/remesh/remesher.h"
 #include "mesostructure/shell.h"
@@ -35,6 +36,9 @@ struct MesoSurface {
     std::shared_ptr<const MesoTexture> normals;
     /// What its walls do to light from everywhere; null: such light falls on it as if it were open.
     std::shared_ptr<const meso::TransferVolume> transfer;
+    /// What the base, and others, do to such light before; of the shell's positions. Null: nothing. Counts with
+    /// `transfer` only.
+    std::shared_ptr<const meso::BaseTransfer> baseTransfer;
     std::shared_ptr<const meso::Appearance> far;  ///< what it looks like from far; null: it is marched from everywhere
 };
 

@@ -13,7 +13,8 @@ using namespace meso::f32::shell;
 
 struct SurfaceCaster::Cast : ShellCast {
     explicit Cast(const HostSurface& s)
-        : ShellCast(s.arrays, s.view, s.shell.texels.data(), s.looks.data(), s.textures, s.isFarDrawn) {}
+        : ShellCast(s.arrays, s.view, s.shell.texels.data(), s.looks.data(), s.baseLight.data(), s.textures,
+                    s.isFarDrawn) {}
 
     struct Ray {
         glm::vec3 origin, towards;

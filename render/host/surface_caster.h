@@ -20,9 +20,10 @@ struct HostSurface {
     const meso::MarchArrays& arrays;
     const meso::Shell& shell;
     frame::MesoView view;
-    std::span<const uint64_t> looks;  ///< words of what is seen from far, and of textures
-    uint32_t textures = 0;            ///< frame::kMesoColours, kMesoNormals
-    bool isFarDrawn = false;          ///< it is seen from far where it is small
+    std::span<const uint64_t> looks;      ///< words of what is seen from far, and of textures
+    uint32_t textures = 0;                ///< frame::kMesoColours, kMesoNormals
+    bool isFarDrawn = false;              ///< it is seen from far where it is small
+    std::span<const uint64_t> baseLight;  ///< over the base's positions (BaseTransfer::lightTexels); may be empty
 };
 
 /// What the ray of a pixel hit. Lengths are world units, directions have the world's axes.

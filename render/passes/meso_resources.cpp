@@ -9,8 +9,8 @@ namespace vcp {
 
 namespace {
 
-constexpr VkDescriptorType kMesoBindings[] = {kUniform, kTexels,  kTexels, kTexels,  kStorage,
-                                              kStorage, kStorage, kTexels, kStorage, kStorage};
+constexpr VkDescriptorType kMesoBindings[] = {kUniform, kTexels, kTexels,  kTexels,  kStorage, kStorage,
+                                              kStorage, kTexels, kStorage, kStorage, kTexels};
 constexpr uint32_t kMesoBindingCount = std::size(kMesoBindings);
 
 }  // namespace
@@ -58,13 +58,17 @@ Result<MesoTexels> MesoResources::words(std::span<const uint32_t> words) {
     return made;
 }
 
-Result<MesoTexels> MesoResources::texels(std::span<const std::byte> bytes, uint32_t texelBytes, VkFormat format,
-                                         const char* what) {
-    const uint64_t count = bytes.size() / texelBytes;
+Result<void> MesoResources::checkTexels(uint64_t count, const char* what) const {
     if (count > device_.limits().maxTexelBufferElements)
         return Error{.code = ErrorCode::Limit,
                      .message = fmt::format("{} texels of {}; this device reads {} at most", count, what,
                                             device_.limits().maxTexelBufferElements)};
+    return {};
+}
+
+Result<MesoTexels> MesoResources::texels(std::span<const std::byte> bytes, uint32_t texelBytes, VkFormat format,
+                                         const char* what) {
+    VCP_TRY(checkTexels(bytes.size() / texelBytes, what));
     MesoTexels made;
     VCP_TRY_ASSIGN(auto buffer, device_.createFilled({&bytes, 1}, VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT));
     made.buffer = std::move(buffer);
@@ -78,6 +82,18 @@ Result<MesoTexels> MesoResources::vectors(std::span<const glm::vec4> vectors) {
 
 Result<MesoTexels> MesoResources::halfs(std::span<const uint64_t> halfs) {
     return texels(std::as_bytes(halfs), sizeof(uint64_t), VK_FORMAT_R16G16B16A16_SFLOAT, "textures");
+}
+
+Result<MesoTexels> MesoResources::emptyHalfs(uint64_t texels) {
+    VCP_TRY(checkTexels(texels, "light over a base"));
+    MesoTexels made;
+    VCP_TRY_ASSIGN(made.buffer,
+                   device_.createBuffer(texels * sizeof(uint64_t),
+                                        VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT,
+                                        MemoryUse::Local));
+    VCP_TRY_ASSIGN(made.view,
+                   device_.createTexelView(made.buffer, VK_FORMAT_R16G16B16A16_SFLOAT, texels * sizeof(uint64_t)));
+    return made;
 }
 
 Result<Buffer> MesoResources::storage(uint64_t bytes) const {
@@ -109,9 +125,12 @@ Result<MesoSet> allocateSet(VkDevice device, VkDescriptorSetLayout layout,
 }
 
 Result<MesoSet> MesoResources::makeSet(const Bound& bound) const {
-    const VkDescriptorPoolSize sizes[] = {{VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, 1}, {kTexels, 4}, {kStorage, 5}};
+    const VkDescriptorPoolSize sizes[] = {{VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, 1}, {kTexels, 5}, {kStorage, 5}};
     VCP_TRY_ASSIGN(auto owner, allocateSet(device_.handle(), setLayout_, sizes));
 
+    const auto orInput = [&](const MesoTexels* texels) {
+        return (texels != nullptr ? texels : bound.input)->view.handle();
+    };
     const VkBufferView views[kMesoBindingCount] = {VK_NULL_HANDLE,
                                                    bound.words->view.handle(),
                                                    bound.words->quads.handle(),
@@ -119,9 +138,10 @@ Result<MesoSet> MesoResources::makeSet(const Bound& bound) const {
                                                    VK_NULL_HANDLE,
                                                    VK_NULL_HANDLE,
                                                    VK_NULL_HANDLE,
-                                                   (bound.look != nullptr ? bound.look : bound.input)->view.handle(),
+                                                   orInput(bound.look),
                                                    VK_NULL_HANDLE,
-                                                   VK_NULL_HANDLE};
+                                                   VK_NULL_HANDLE,
+                                                   orInput(bound.baseLight)};
     const auto orUnused = [&](const Buffer* buffer) { return buffer != nullptr ? buffer : bound.counters; };
     const Buffer* const buffers[kMesoBindingCount] = {bound.constants,
                                                       nullptr,
@@ -132,7 +152,8 @@ Result<MesoSet> MesoResources::makeSet(const Bound& bound) const {
                                                       bound.counters,
                                                       nullptr,
                                                       orUnused(bound.sceneLight),
-                                                      orUnused(bound.depths)};
+                                                      orUnused(bound.depths),
+                                                      nullptr};
     VkDescriptorBufferInfo infos[kMesoBindingCount] = {};
     VkWriteDescriptorSet writes[kMesoBindingCount];
     for (uint32_t i = 0; i < kMesoBindingCount; ++i) {

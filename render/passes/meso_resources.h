@@ -12,6 +12,7 @@
 //  7        appearance, textures          CPU (upload)            surface
 //  8, 9     planes of light and depths    gather, scene light,    scene light, shade
 //           of the whole picture          surface
+// 10        light over the base           copies                  surface
 //
 // Push constants: the ray of light that is cast, MesoLightRay.
 #pragma once
@@ -79,6 +80,7 @@ public:
     Result<MesoTexels> words(std::span<const uint32_t> words);
     Result<MesoTexels> vectors(std::span<const glm::vec4> vectors);
     Result<MesoTexels> halfs(std::span<const uint64_t> halfs);  ///< four to a texel
+    Result<MesoTexels> emptyHalfs(uint64_t texels);             ///< to be filled by copies
     Result<Buffer> storage(uint64_t bytes) const;
 
     struct Bound {
@@ -87,6 +89,7 @@ public:
         const Buffer *hits, *picture, *counters;
         const MesoTexels* look = nullptr;                       ///< null: the shaders read none
         const Buffer *sceneLight = nullptr, *depths = nullptr;  ///< null: surfaces and datasets do not shade each other
+        const MesoTexels* baseLight = nullptr;                  ///< null: the shaders read none
     };
     /// Makes a descriptor set. Errors: Device.
     Result<MesoSet> makeSet(const Bound& bound) const;
@@ -99,6 +102,7 @@ public:
 private:
     explicit MesoResources(Device& device) : device_(device) {}
     Result<void> createLayout();
+    [[nodiscard]] Result<void> checkTexels(uint64_t count, const char* what) const;
     Result<MesoTexels> texels(std::span<const std::byte> bytes, uint32_t texelBytes, VkFormat format, const char* what);
 
     Device& device_;

@@ -64,6 +64,7 @@ Result<void> MesoSurfacePass::setSurfaces(std::span<const MesoSurface> surfaces)
         const MesoLook described = mesoLook(surface);
         made.view = described.view, made.textures = described.textures, made.isFarDrawn = described.isFarDrawn;
         made.hasTransfer = surface.transfer != nullptr;
+        if (changesBaseLight(surface)) made.baseTransfer = surface.baseTransfer;
         auto& look = looks[lookKey(surface)];
         if (!look && !described.looks.empty()) {
             VCP_TRY_ASSIGN(auto uploadedLook, resources_.halfs(described.looks));
@@ -111,10 +112,19 @@ Result<void> MesoSurfacePass::makeTarget(MesoTarget& target, PictureSize size, u
         const auto& [hits, normals] = target.remeshed.copies;
         MesoTarget::Drawing drawing;
         VCP_TRY_ASSIGN(drawing.constants, device_.createBuffer(sizeof(MesoConstants), kConstantsUse, MemoryUse::Local));
+        MesoTarget::Drawing::BaseLight& light = drawing.baseLight;
+        const bool hasLight = surface.baseTransfer && planes > frame::kMesoPlanes;
+        if (hasLight) {
+            VCP_TRY_ASSIGN(light.texels,
+                           resources_.emptyHalfs(meso::BaseTransfer::kTexels * surface.baseTransfer->vertices()));
+            VCP_TRY_ASSIGN(light.filled, device_.createBuffer(light.texels.buffer.bytes(),
+                                                              VK_BUFFER_USAGE_TRANSFER_SRC_BIT, MemoryUse::Upload));
+        }
         VCP_TRY_ASSIGN(drawing.set,
                        resources_.makeSet({&drawing.constants, isRemeshed ? &normals : surface.words.get(),
                                            isRemeshed ? &hits : &surface.shell, &target.hits, picture.colours,
-                                           &target.counters, surface.look.get(), picture.sceneLight, picture.depths}));
+                                           &target.counters, surface.look.get(), picture.sceneLight, picture.depths,
+                                           hasLight ? &light.texels : nullptr}));
         target.drawings.push_back(std::move(drawing));
     }
     target.size = size, target.planes = planes, target.surfaces = version_, target.picture = picture.colours->handle();
@@ -161,6 +171,7 @@ Result<void> MesoSurfacePass::prepare(MesoTarget& target, const Picture& picture
     for (size_t i = 0; i < surfaces_.size(); ++i) {
         const Placed& surface = surfaces_[i];
         VCP_TRY(choosePipelines(surface, target.drawings[i], request.shading, inScene));
+        fillBaseLight(surface, target.drawings[i].baseLight, request.shading);
         if (surface.remeshed.surface)
             VCP_TRY(raster_.remesh(target.remeshed, surface.number, surface.remeshed, *surface.levels,
                                    remeshLook(request)));
@@ -169,6 +180,16 @@ Result<void> MesoSurfacePass::prepare(MesoTarget& target, const Picture& picture
     if (planes > frame::kMesoPlanes) shade.push_back(frame::kMesoTransferKept);
     VCP_TRY_ASSIGN(target.shade, resources_.pipeline(kMesoShadeSpirv, shade));
     return {};
+}
+
+void MesoSurfacePass::fillBaseLight(const Placed& surface, MesoTarget::Drawing::BaseLight& light,
+                                    const Shading& shading) {
+    if (light.filled.bytes() == 0) return;
+    const auto harmonics = environmentHarmonics(*shading.environment);
+    if (harmonics == light.of) return;
+    const std::vector<uint64_t> texels = surface.baseTransfer->lightTexels(harmonics);
+    std::memcpy(light.filled.mapped(), texels.data(), texels.size() * sizeof(uint64_t));
+    light.of = harmonics;
 }
 
 bool MesoSurfacePass::keepsTransfer(const Shading& shading) const {
@@ -213,6 +234,10 @@ void MesoSurfacePass::recordHits(VkCommandBuffer commands, const MesoTarget& tar
     for (size_t i = 0; i < surfaces_.size(); ++i) {
         const MesoConstants constants = constantsOf(i, request);
         vkCmdUpdateBuffer(commands, target.drawings[i].constants.handle(), 0, sizeof constants, &constants);
+        const MesoTarget::Drawing::BaseLight& light = target.drawings[i].baseLight;
+        if (light.filled.bytes() == 0) continue;
+        const VkBufferCopy all{0, 0, light.filled.bytes()};
+        vkCmdCopyBuffer(commands, light.filled.handle(), light.texels.buffer.handle(), 1, &all);
     }
     barrierToAll(commands);
     for (size_t i = 0; i < surfaces_.size(); ++i) {

@@ -12,6 +12,7 @@
 // barrierComputeToReadback. Without surfaces nothing is made: no pipeline, no buffer.
 #pragma once
 
+#include <array>
 #include <memory>
 #include <optional>
 #include <span>
@@ -41,6 +42,12 @@ struct MesoTarget {
     /// What one surface is drawn with. `sun` and `sky` cast one ray from all that is seen.
     struct Drawing {
         Buffer constants;
+        /// The light over the surface's base; empty where it is that of the surroundings.
+        struct BaseLight {
+            MesoTexels texels;
+            Buffer filled;                   ///< what is copied to them
+            std::array<glm::vec4, 16> of{};  ///< the surroundings that it was filled for
+        } baseLight;
         MesoSet set;
         VkPipeline cast = VK_NULL_HANDLE, shadow = VK_NULL_HANDLE, sun = VK_NULL_HANDLE, sky = VK_NULL_HANDLE;
     };
@@ -94,7 +101,8 @@ public:
 private:
     struct Placed {
         std::shared_ptr<const meso::MarchArrays> arrays;
-        std::shared_ptr<MesoTexels> words, look;  ///< look: null without textures
+        std::shared_ptr<MesoTexels> words, look;                 ///< look: null without textures
+        std::shared_ptr<const meso::BaseTransfer> baseTransfer;  ///< null where it changes nothing
         MesoTexels shell;
         RemeshedSurface remeshed;
         std::shared_ptr<MesoTexels> levels;  ///< of the heights of what is remeshed
@@ -106,6 +114,7 @@ private:
     };
     /// Whether a picture has a plane of the light that comes through volumes of transfer.
     [[nodiscard]] bool keepsTransfer(const Shading& shading) const;
+    static void fillBaseLight(const Placed& surface, MesoTarget::Drawing::BaseLight& light, const Shading& shading);
     Result<void> makeTarget(MesoTarget& target, PictureSize size, uint32_t planes, const Picture& picture);
     Result<void> choosePipelines(const Placed& surface, MesoTarget::Drawing& drawing, const Shading& shading,
                                  bool inScene);

@@ -35,9 +35,11 @@ layout(set = 0, binding = 7) uniform textureBuffer lookTexels;  // what is seen 
 // Of pictures in which surfaces and datasets shade each other: planes of light (scene_planes.glsl), and depths of all.
 layout(set = 0, binding = 8, std430) buffer SceneLightBlock { uint sceneLight[]; };
 layout(set = 0, binding = 9, std430) buffer TargetDepthBlock { uint targetDepths[]; };
+layout(set = 0, binding = 10) uniform textureBuffer baseLightTexels;
 layout(push_constant) uniform RayBlock { MesoLightRay ray; };
 
 uint fetchWord(uint i) { return texelFetch(wordTexels, int(i)).x; }
 uvec4 fetchQuad(uint i) { return texelFetch(quadTexels, int(i)); }
 vec4 fetchInput(int i) { return texelFetch(inputTexels, i); }
 vec4 fetchLook(int i) { return texelFetch(lookTexels, i); }
+vec4 fetchBaseLight(int i) { return texelFetch(baseLightTexels, i); }

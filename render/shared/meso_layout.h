@@ -62,7 +62,8 @@ struct MesoView {
     uint sectionCount;
     float shadowLift;     // world units by which shadow rays start above a hit
     uint hasEnvironment;  // 0 or 1
-    uint unused0, unused1;
+    uint hasBaseLight;    // 1: the base changes the light of the surroundings (mesostructure/base_transfer.h)
+    uint unused;
     vec4 lights[kMesoMaxLights];      // unit, towards each light; w: its strength
     vec4 sections[kMesoMaxSections];  // as FrameConstants::sections, in world units from the shell's origin
     vec4 environment[9];              // as FrameConstants::environment, world axes

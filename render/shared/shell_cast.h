@@ -3,9 +3,9 @@
 // global in a shader is a member there. The common subset of GLSL and GLM is used: no swizzles, no constructors of
 // structs.
 //
-// Whoever includes it gives: the marcher and its record `meso`, the surface's MesoView `view`; fetchInput and
-// fetchLook, which read the shell's texels and those of looks; kShadow (1: any hit does), kTextures and kFromFar, as
-// meso_surface.comp has them.
+// Whoever includes it gives: the marcher and its record `meso`, the surface's MesoView `view`; fetchInput, fetchLook
+// and fetchBaseLight, which read the texels of the shell, of looks and of the light over the base; kShadow (1: any hit
+// does), kTextures and kFromFar, as meso_surface.comp has them.
 
 // A pixel's width in world units: at the start of its ray, and how much it grows along it.
 float widthAtStart, widthGrowth;

@@ -15,6 +15,7 @@
 #include "mesostructure/harmonics.h"
 #include "mesostructure/tile_paths.h"
 #include "mesostructure/transfer_volume.h"
+#include "tests/support/groove_light.h"
 #include "tests/support/meso_rays.h"
 
 namespace vcp::meso {
@@ -135,36 +136,13 @@ TEST(TilePaths, WhiteInWhiteIsWhite) {
     }
 }
 
-/// The light on the strips of one wall of an endless groove of 90 degrees under a sky of 1, by radiosity: form factors
-/// of strips by Hottel's crossed strings.
-std::vector<double> grooveLight(int strips, double albedo) {
-    const auto left = [&](int i) { return glm::dvec2(-1, 1) * (double(i) / strips); };
-    const auto right = [&](int i) { return glm::dvec2(1, 1) * (double(i) / strips); };
-    std::vector<double> light(size_t(strips), 1.0);
-    for (int round = 0; round < 60; ++round) {
-        std::vector<double> next;
-        for (int i = 0; i < strips; ++i) {
-            double across = 0, from = 0;
-            for (int j = 0; j < strips; ++j) {
-                const double factor = (glm::length(left(i + 1) - right(j)) + glm::length(left(i) - right(j + 1)) -
-                                       glm::length(left(i) - right(j)) - glm::length(left(i + 1) - right(j + 1))) /
-                                      (2 * glm::length(left(i + 1) - left(i)));
-                across += factor, from += factor * albedo * light[size_t(j)];
-            }
-            next.push_back(1 - across + from);
-        }
-        light = next;
-    }
-    return light;
-}
-
 TEST(TilePaths, GroovesAreAsRadiosityHasThem) {
     const HeightMap map = grooves();
     const auto shape = test::heights(map);
     constexpr int kStrips = 64;
     for (const double albedo : {0.0, 0.5, 0.9}) {
         const TilePaths paths(*shape, albedo);
-        const std::vector<double> known = grooveLight(kStrips, albedo);
+        const std::vector<double> known = vcp::test::grooveLight(kStrips, albedo);
         double mean = 0;
         for (const double light : known) mean += light / kStrips;
         // Of walls that face each other under twice 45 degrees, each sees 1 - sin 45 of the other.

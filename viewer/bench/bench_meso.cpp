@@ -406,7 +406,7 @@ Result<BenchMesoReport> benchMeso(const BenchMesoOptions& options) {
                 return !options.progress ||
                        options.progress(assets[a] + ": light", (double(a) + part) / double(assets.size()));
             };
-            VCP_TRY_ASSIGN(const auto lights, compareMesoLight(subject->asset, *subject->shape, lit));
+            VCP_TRY_ASSIGN(const auto lights, compareMesoLight(assets[a], subject->asset, *subject->shape, lit));
             report.lights.insert(report.lights.end(), lights.begin(), lights.end());
         }
         if (options.checkRays == 0) continue;

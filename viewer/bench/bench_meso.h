@@ -115,10 +115,10 @@ struct MesoFactors {
     double wrongHits = 0;   ///< part whose hit, told by half a point before the boundary, is wrong
 };
 
-/// Light from everywhere on a picture of one tile, at 45 degrees. `form`: as if the surface were open (9 coefficients
-/// of the light, no shadow); by as many paths as the truth, of 16 coefficients of the light; by the volume of transfer,
-/// which has them too. Truth is the path tracer's under the surroundings themselves, or the form that is named after
-/// "against".
+/// Light from everywhere on a picture of one tile, at 45 degrees, or of a base surface, drawn by the host. `form`: as
+/// if the surface were open (9 coefficients of the light, no shadow); by as many paths as the truth, of 16 coefficients
+/// of the light; by the volume of transfer, which has them too, without and with the transfer of the base. Truth is the
+/// path tracer's under the surroundings themselves, or the form that is named after "against".
 struct MesoLight {
     std::string asset, sky, form;
     double relativeMse = 0;  ///< mean of (light - truth)^2 / (truth^2 + 0.01), over pixels and channels
@@ -178,10 +178,11 @@ Result<std::vector<MesoCheck>> checkMesoMaps(const std::string& asset, const mes
 /// Compares factors of an asset's displacement map of 32 points along x. Errors: the builders'.
 Result<std::vector<MesoFactors>> compareMesoFactors(const meso::Asset& asset, const meso::Shape& shape);
 
-/// Compares light from everywhere on an asset's tile, under each of kEnvironmentNames; where the asset holds no
-/// transfer, it is traced. `progress` may be empty; false cancels. Errors: traceTransfer's; Usage (nothing is seen).
-Result<std::vector<MesoLight>> compareMesoLight(const meso::Asset& asset, const meso::Shape& shape,
-                                                const std::function<bool(double)>& progress);
+/// Compares light from everywhere on an asset's tile, and on two base surfaces, under each of kEnvironmentNames; where
+/// the asset holds no transfer, it is traced. `name`: as openMesoAsset. `progress` may be empty; false cancels. Errors:
+/// traceTransfer's; Usage (nothing is seen).
+Result<std::vector<MesoLight>> compareMesoLight(const std::string& name, const meso::Asset& asset,
+                                                const meso::Shape& shape, const std::function<bool(double)>& progress);
 
 /// Judges the rays whose truth is known; `texel` in tile units.
 MesoJudged judgeMeso(const std::vector<meso::MarchResult>& results, const std::vector<meso::TruthHit>& truths,

@@ -290,8 +290,9 @@ RunCommand addBenchMeso(CLI::App& bench) {
     app->add_flag("--sweep", options.sweep, "Each method at several values of its knob");
     app->add_flag("--factors", options.factors,
                   "Also compare factors of displacement maps, published and clustered, with the distances");
-    app->add_flag("--light", options.light,
-                  "Also compare light from everywhere on a tile, in the three skies, with a path tracer");
+    app->add_flag(
+        "--light", options.light,
+        "Also compare light from everywhere on a tile, and on two bases, in the three skies, with a path tracer");
     app->add_flag("--published", options.published,
                   "Beside the ratios of the paper's tables (with --sweep, for those of times)");
     app->add_option("--remesh", command->remesh,

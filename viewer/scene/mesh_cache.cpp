@@ -17,6 +17,7 @@
 #include "octree/io/output_file.h"
 #include "octree/io/regular_file.h"
 #include "streaming/shard/shard_manifest.h"
+#include "viewer/scene/base_light.h"
 
 namespace vcp {
 
@@ -224,7 +225,7 @@ void MeshCache::trim(const fs::path& keep) const {
     std::erase_if(files, [&](const CachedFile& file) {
         if (isLeftoverName(file.path) && now - file.used > kLeftoverAge) fs::remove(file.path, ignored);
         if (isOurName(file.path, kListExtension)) lists.push_back(file);
-        return !isOurName(file.path, kExtension);
+        return !isOurName(file.path, kExtension) && !isOurName(file.path, kBaseLightExtension);
     });
     std::sort(files.begin(), files.end(), [](const CachedFile& a, const CachedFile& b) { return a.used < b.used; });
     uint64_t total = 0;

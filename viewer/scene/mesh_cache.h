@@ -48,8 +48,8 @@ public:
     /// Returns where the dataset for `options` is or would be. Errors: Io (input missing).
     [[nodiscard]] Result<std::filesystem::path> pathFor(const BuildOptions& options) const;
 
-    /// Removes the datasets used least recently until the folder is within its limit, and leftovers of builds
-    /// that died; never `keep`.
+    /// Removes the datasets, and the light of bases (base_light.h), used least recently until the folder is within its
+    /// limit, and leftovers of builds that died; never `keep`.
     void trim(const std::filesystem::path& keep) const;
 
 private:

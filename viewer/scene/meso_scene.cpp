@@ -12,7 +12,9 @@
 #include "mesostructure/base/surface_edges.h"
 #include "mesostructure/remesh/remesher.h"
 #include "mesostructure/solids.h"
+#include "viewer/scene/base_light.h"
 #include "viewer/scene/base_mesh.h"
+#include "viewer/scene/mesh_cache.h"
 #include "viewer/scene/tile_texture.h"
 
 namespace vcp {
@@ -134,6 +136,43 @@ Result<Transfer> transferOf(const MesoSurfaceDescription& d, const Asset& asset)
     return asset.transfer;
 }
 
+/// The bases of a scene, whose surfaces shade each other in light from everywhere. What moves does not take part.
+class SceneBases {
+public:
+    explicit SceneBases(std::span<const MesoSurfaceDescription> descriptions)
+        : isAsked_(std::ranges::any_of(descriptions, isAsking)) {}
+
+    Result<void> add(const MesoSurfaceDescription& d, const Asset& asset, BaseSurface base, Transfer transfer) {
+        if (!isAsked_ || !d.path.points.empty()) return {};
+        VCP_TRY_ASSIGN(const auto shape, shapeOf(asset));
+        const double slab = d.heightScale * tileEdge(base) * asset.extent.z,
+                     albedo = transfer ? double(transfer->albedo) : TransferOptions().albedo;
+        bases_.push_back(sceneBase(std::move(base), *shape, slab, d.offset * d.scale, albedo));
+        bases_.back().isAsked = isAsking(d);
+        return {};
+    }
+    /// Gives its transfer to each surface that asks for it.
+    void trace(std::span<const MesoSurfaceDescription> descriptions, MesoScene& scene) const {
+        if (bases_.empty()) return;
+        const auto cache = defaultCacheFolder();
+        const auto traced = traceBases(bases_, cache ? *cache : std::filesystem::path());
+        if (!traced) {
+            scene.warnings.push_back(traced.error().message + "; the bases do not shade each other");
+            return;
+        }
+        size_t next = 0;
+        for (size_t i = 0; i < descriptions.size(); ++i)
+            if (descriptions[i].path.points.empty()) scene.surfaces[i].baseTransfer = (*traced)[next++];
+    }
+
+private:
+    static bool isAsking(const MesoSurfaceDescription& d) {
+        return d.withTransfer && d.withBaseTransfer && d.path.points.empty();
+    }
+    bool isAsked_;
+    std::vector<SceneBase> bases_;
+};
+
 void warn(const MesoSurfaceDescription& d, const BaseSurface& base, const Shell& shell,
           std::vector<std::string>& warnings) {
     if (const auto edges = isFile(d) ? edgesOf(base) : SurfaceEdges(); !edges) {
@@ -219,6 +258,7 @@ Result<MesoScene> makeMesoScene(std::span<const MesoSurfaceDescription> descript
     Remeshing remeshing;
     std::map<std::pair<std::string, double>, std::shared_ptr<const Appearance>> appearances;
     std::map<std::string, Transfer> transfers;  // an asset is read once for each surface, and kept once
+    SceneBases bases(descriptions);
     for (const MesoSurfaceDescription& d : descriptions) {
         SurfacePath& path = scene.paths.emplace_back(d.path);
         for (glm::dvec3& point : path.points) point -= d.place;
@@ -228,6 +268,7 @@ Result<MesoScene> makeMesoScene(std::span<const MesoSurfaceDescription> descript
         if (!base) return d.from.blamed(base.error());
         const auto transfer = transferOf(d, *asset);
         if (!transfer) return d.from.blamed(transfer.error());
+        VCP_TRY(bases.add(d, *asset, *base, *transfer));
         if (d.method.name == kRemeshMethod) {
             auto surface = remeshing.make(d, *asset, *base);
             if (!surface) return d.from.blamed(surface.error());
@@ -273,6 +314,7 @@ Result<MesoScene> makeMesoScene(std::span<const MesoSurfaceDescription> descript
         surface.withBase = d.withBase;
         scene.surfaces.push_back(std::move(surface));
     }
+    bases.trace(descriptions, scene);
     return scene;
 }
 

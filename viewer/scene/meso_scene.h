@@ -76,6 +76,7 @@ struct MesoSurfaceDescription {
     bool withBase = true;
     bool withFar = true;        ///< far away it is not marched (MesoLook::errorPixels)
     bool withTransfer = false;  ///< light from everywhere comes as the asset's transfer says; then it has no far look
+    bool withBaseTransfer = true;  ///< and as the bases of the scene let it through, which shade each other
     ScenePlace from = {};
 };
 

@@ -193,10 +193,10 @@ private:
         MesoSurfaceDescription made;
         made.method.name = "boxes";
         if (!isObject(json, at)) return made;
-        onlyKeys(json, at, {"asset",  "surface", "subdivide", "tiles",          "height", "translate", "scale",
-                            "up",     "colour",  "texture",   "normal_texture", "method", "cell",      "grid",
-                            "cones",  "steps",   "rank",      "directions",     "base",   "far",       "offset",
-                            "filter", "path",    "seconds",   "transfer",       "error"});
+        onlyKeys(json, at, {"asset",  "surface", "subdivide", "tiles",          "height",        "translate", "scale",
+                            "up",     "colour",  "texture",   "normal_texture", "method",        "cell",      "grid",
+                            "cones",  "steps",   "rank",      "directions",     "base",          "far",       "offset",
+                            "filter", "path",    "seconds",   "transfer",       "base_transfer", "error"});
         if (!json.contains("asset"))
             wrong(at, "\"asset\" is missing");
         else
@@ -233,6 +233,7 @@ private:
         if (json.contains("base")) made.withBase = flag(json["base"], at + "/base");
         if (json.contains("far")) made.withFar = flag(json["far"], at + "/far");
         if (json.contains("transfer")) made.withTransfer = flag(json["transfer"], at + "/transfer");
+        if (json.contains("base_transfer")) made.withBaseTransfer = flag(json["base_transfer"], at + "/base_transfer");
         return made;
     }
 

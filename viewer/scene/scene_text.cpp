@@ -64,6 +64,7 @@ OrderedJson surfaceJson(const MesoSurfaceDescription& surface) {
     put("base", surface.withBase, usual.withBase);
     put("far", surface.withFar, usual.withFar);
     put("transfer", surface.withTransfer, usual.withTransfer);
+    put("base_transfer", surface.withBaseTransfer, usual.withBaseTransfer);
     return json;
 }
 

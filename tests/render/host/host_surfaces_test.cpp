@@ -1,10 +1,14 @@
 // Surfaces with mesostructure by the host against those by the shaders, pixel by pixel.
+#include <array>
 #include <atomic>
 #include <numeric>
+#include <optional>
 
 #include <glm/geometric.hpp>
 
+#include "builder/measure/mesh_bvh.h"
 #include "mesostructure/appearance.h"
+#include "mesostructure/base_transfer.h"
 #include "tests/support/host_comparison.h"
 #include "tests/support/meso_surfaces.h"
 
@@ -155,9 +159,28 @@ std::shared_ptr<const meso::TransferVolume> transferOf(const meso::Asset& asset)
         *traceTransfer(**shapeOf(asset), {.cells = 12, .albedo = 0.7, .paths = 24}));
 }
 
+/// What the torus of mesoSurface does to light from everywhere.
+std::shared_ptr<const meso::BaseTransfer> torusTransfer(double albedo) {
+    meso::BaseScene scene;
+    scene.add(*meso::makeBaseSurface("torus", 2), 0.1, albedo);
+    const IndexedMesh mesh{scene.positions, scene.triangles, {}};
+    const MeshBvh bvh(mesh);
+    meso::BaseTransferOptions options{.rays = 64};
+    options.cast = [&](glm::dvec3 origin, glm::dvec3 direction) -> std::optional<meso::BaseHit> {
+        const auto hit = bvh.nearestHit(origin, direction);
+        if (!hit) return std::nullopt;
+        return meso::BaseHit{hit->triangle, hit->t};
+    };
+    const std::array all{std::pair(0u, uint32_t(scene.positions.size()))};
+    auto made = traceBaseTransfer(scene, all, options);
+    EXPECT_TRUE(made) << made.error().line();
+    return std::make_shared<const meso::BaseTransfer>(std::move((*made)[0]));
+}
+
 TEST_F(HostSurfaces, WithTransferAsTheShadersHaveIt) {
     MesoSurface hollow = mesoSurface(relief(), "boxes", "torus", 0.3);
     hollow.transfer = transferOf(relief());
+    hollow.baseTransfer = torusTransfer(0.6);
     MesoSurface beads = mesoSurface(solidAsset("beads"), "boxes", "cylinder", 0.2, 3, {0.6, -0.3, 0.2});
     beads.transfer = transferOf(solidAsset("beads"));
     // One without lies before and behind the others, in all orders of drawing.
@@ -206,6 +229,18 @@ TEST_F(HostSurfaces, TransferOfAPlaneLooksOpenOnAnySurface) {
     EXPECT_LE(most, 4);
     EXPECT_LT(mean, 0.5);
     EXPECT_GT(apart(drawn(shadowed), drawn(relieved)).first, 1);
+    // A torus that gives nothing back takes light from itself, and what it lets through turns with the light.
+    MesoSurface ring = mesoSurface(relief(), "boxes", "torus", 0.3), shaded = ring;
+    ring.transfer = transferOf(relief());
+    shaded.transfer = ring.transfer, shaded.baseTransfer = torusTransfer(0);
+    const Picture before = drawn(ring), after = drawn(shaded);
+    EXPECT_GT(apart(before, after).first, 0.3);
+    EXPECT_LT(std::accumulate(after.rgba.begin(), after.rgba.end(), uint64_t{0}),
+              std::accumulate(before.rgba.begin(), before.rgba.end(), uint64_t{0}));
+    request.shading.environment->turn = 190;
+    EXPECT_GT(apart(after, drawn(shaded)).first, 1);
+    request.shading.environment->turn = 50;
+    EXPECT_EQ(drawn(shaded), after);
     // What no picture asks for makes no pipeline and no bytes.
     ASSERT_TRUE(renderer_->setSurfaces(std::vector{without}));
     request.shading.environment.reset();
