@@ -17,10 +17,10 @@ using glm::dvec2, glm::dvec3, std::numbers::pi;
 
 constexpr int kShadowRays = 2;
 constexpr double kLift = 1e-4;  // by which shadow rays start above a hit, tile units
-using Harmonics = std::array<double, 9>;
+using NineHarmonics = std::array<double, 9>;
 
 /// Real spherical harmonics of bands 0 to 2: 1; x, y, z; xy, yz, xz, 3 z^2 - 1; x^2 - y^2.
-Harmonics harmonicsOf(dvec3 d) {
+NineHarmonics harmonicsOf(dvec3 d) {
     return {0.282095,
             0.488603 * d.x,
             0.488603 * d.y,
@@ -77,7 +77,7 @@ private:
 
 /// What one view shows: coefficients without and with shadows, the mean normal.
 struct Sums {
-    Harmonics plain{}, shadowed{};
+    NineHarmonics plain{}, shadowed{};
     dvec3 normal{0};
     uint32_t count = 0, bottoms = 0;
 
@@ -85,21 +85,21 @@ struct Sums {
         if (!seen.isResolved) return;
         ++count, bottoms += seen.isBottom;
         normal += seen.normal;
-        const Harmonics at = harmonicsOf(seen.normal);
+        const NineHarmonics at = harmonicsOf(seen.normal);
         for (int i = 0; i < 9; ++i)
             plain[size_t(i)] += cosineBand(i) * at[size_t(i)], shadowed[size_t(i)] += cosineBand(i) * at[size_t(i)];
         // The light that shadows take is summed: it is less than what is left, so its noise is less.
         for (int k = 0; k < kShadowRays; ++k) {
             const dvec3 light = directionByCosine(seen.normal, evenPoint(number * kShadowRays + uint64_t(k)));
             if (caster.isLit(seen, light)) continue;
-            const Harmonics lost = harmonicsOf(light);
+            const NineHarmonics lost = harmonicsOf(light);
             for (size_t i = 0; i < 9; ++i) shadowed[i] -= pi / kShadowRays * lost[i];
         }
     }
     void append(std::vector<glm::vec4>& texels) const {
         const double part = 1.0 / std::max(count, 1u);
         const dvec3 n = normal * part;
-        for (const Harmonics* c : {&plain, &shadowed}) {
+        for (const NineHarmonics* c : {&plain, &shadowed}) {
             const auto at = [&](size_t i) { return float((*c)[i] * part); };
             texels.emplace_back(at(0), at(1), at(2), at(3));
             texels.emplace_back(at(4), at(5), at(6), at(7));
@@ -127,7 +127,7 @@ Appearance appearanceOf(const Shape& shape, double heightScale, uint32_t rays) {
 
 double lightOf(const Appearance& appearance, glm::uvec2 view, glm::dvec3 light, bool withShadows) {
     const size_t first = Appearance::kTexels * (view.x + size_t{Appearance::kViews} * view.y) + (withShadows ? 3 : 0);
-    const Harmonics at = harmonicsOf(light);
+    const NineHarmonics at = harmonicsOf(light);
     double sum = 0;
     for (size_t i = 0; i < 9; ++i) sum += double(appearance.texels[first + i / 4][int(i % 4)]) * at[i];
     if (withShadows) sum = std::min(sum, std::max(light.z, 0.0) / viewOf(view.x, view.y).z);

@@ -15,28 +15,27 @@ namespace vcp::meso {
 
 namespace {
 
-using f64::Harmonics;
 using glm::dvec2, glm::dvec3;
 using Row = std::array<double, 16>;
 
-constexpr double kLift = 1e-6;          // by which rays start above a base, parts of the scene's diagonal
+constexpr double kBaseLift = 1e-6;      // by which rays start above a base, parts of the scene's diagonal
 constexpr double kSteadiness = 1e-5;    // that is added to the least squares' diagonal, whose largest is near 0.1
 constexpr double kBounceIsOver = 1e-4;  // of what a white surface gives back, at most, by one more bounce
 
 /// Weighs the rays over a hemisphere so that sums of what they bring are coefficients (the inverse of the harmonics'
 /// products over the rays, by Cholesky's decomposition).
-std::vector<Harmonics> fitOf(std::span<const Harmonics> rays) {
+std::vector<f64::Harmonics> fitOf(std::span<const f64::Harmonics> rays) {
     const double count = double(rays.size());
     double l[16][16] = {};
     for (int i = 0; i < 16; ++i)
         for (int j = 0; j <= i; ++j) {
             double sum = i == j ? kSteadiness : 0;
-            for (const Harmonics& ray : rays) sum += ray.c[i] * ray.c[j] / count;
+            for (const f64::Harmonics& ray : rays) sum += ray.c[i] * ray.c[j] / count;
             for (int k = 0; k < j; ++k) sum -= l[i][k] * l[j][k];
             l[i][j] = i == j ? std::sqrt(sum) : sum / l[j][j];
         }
-    std::vector<Harmonics> fit;
-    for (Harmonics ray : rays) {
+    std::vector<f64::Harmonics> fit;
+    for (f64::Harmonics ray : rays) {
         for (int i = 0; i < 16; ++i) {
             for (int k = 0; k < i; ++k) ray.c[i] -= l[i][k] * ray.c[k];
             ray.c[i] /= l[i][i];
@@ -69,7 +68,7 @@ public:
         dvec3 low(0), high(0);
         if (!scene.positions.empty()) low = high = scene.positions.front();
         for (const dvec3 p : scene.positions) low = glm::min(low, p), high = glm::max(high, p);
-        lift_ = kLift * glm::length(high - low);
+        lift_ = kBaseLift * glm::length(high - low);
         blocked_.resize(scene.positions.size());
         own_.resize(scene.positions.size());
     }
@@ -77,14 +76,14 @@ public:
     void cast(size_t vertex) {
         const dvec3 n = scene_.normals[vertex];
         const glm::dmat3 frame = frameOf(n);
-        Harmonics open = f64::clampedCosine(n);
+        f64::Harmonics open = f64::clampedCosine(n);
         if (n != dvec3(0))
             for (uint32_t i = 0; i < options_.rays; ++i) {
                 const dvec3 d = frame * directions_[i], from = scene_.positions[vertex] + lift_ * n;
                 const auto hit = options_.cast(from, d);
                 if (!hit) continue;
                 blocked_[vertex].push_back(blockedBy(*hit, i, from + hit->t * d));
-                const Harmonics lost = f64::harmonicsOf(d);
+                const f64::Harmonics lost = f64::harmonicsOf(d);
                 for (int k = 0; k < 16; ++k) open.c[k] -= lost.c[k] / options_.rays;
             }
         std::copy(open.c, open.c + 16, own_[vertex].begin());
@@ -115,14 +114,14 @@ public:
         std::array<Row, 16> local{};
         for (const Blocked& blocked : blocked_[vertex]) {
             Row change = givenBack(blocked, vertex);
-            const Harmonics lost = f64::harmonicsOf(frame * directions_[blocked.ray]);
+            const f64::Harmonics lost = f64::harmonicsOf(frame * directions_[blocked.ray]);
             for (size_t k = 0; k < 16; ++k) change[k] -= lost.c[k];
             for (size_t i = 0; i < 16; ++i)
                 for (size_t j = 0; j < 16; ++j) local[i][j] += fit_[blocked.ray].c[i] * change[j];
         }
         std::array<float, BaseTransfer::kValues> made{};
         for (size_t j = 0; j < 16; ++j) {
-            Harmonics column;
+            f64::Harmonics column;
             for (size_t i = 0; i < 16; ++i) column.c[i] = local[i][j];
             column = turnedHarmonics(column, frame);
             for (size_t i = 0; i < 16; ++i) made[16 * j + i] = float(column.c[i]);
@@ -168,9 +167,9 @@ private:
     const BaseScene& scene_;
     const BaseTransferOptions& options_;
     double lift_ = 0;
-    std::vector<dvec3> directions_;     // of the rays, z along the normal
-    std::vector<Harmonics> harmonics_;  // of them
-    std::vector<Harmonics> fit_;        // what each ray adds to the coefficients
+    std::vector<dvec3> directions_;          // of the rays, z along the normal
+    std::vector<f64::Harmonics> harmonics_;  // of them
+    std::vector<f64::Harmonics> fit_;        // what each ray adds to the coefficients
     std::vector<std::vector<Blocked>> blocked_;
     std::vector<Row> own_, lit_;  // what a white flat surface gives back: straight from the surroundings; all of it
 };
