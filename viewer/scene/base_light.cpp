@@ -19,10 +19,11 @@
 
 namespace vcp {
 
-using namespace meso;
+using meso::BaseHit, meso::BaseScene, meso::BaseSurface, meso::BaseTransfer, meso::BaseTransferOptions;
+using meso::TilePaths, meso::TileReflection;
 
-SceneBase sceneBase(BaseSurface surface, const Shape& shape, double slab, double offset, double albedo) {
-    const TileReflection tile = tileReflection(TilePaths(shape, albedo));
+SceneBase sceneBase(BaseSurface surface, const meso::Shape& shape, double slab, double offset, double albedo) {
+    const TileReflection tile = meso::tileReflection(TilePaths(shape, albedo));
     return {std::move(surface), offset + slab * tile.height / shape.extent().z, tile.albedo, false};
 }
 
@@ -123,7 +124,7 @@ Result<Traced> trace(const BaseScene& scene, const Ranges& ranges, BaseTransferO
     options.shareOut = [&](size_t count, const auto& fill) {
         return shareOut(count, fill, [&](double part) { return !progress || progress(part); });
     };
-    return traceBaseTransfer(scene, ranges, options);
+    return meso::traceBaseTransfer(scene, ranges, options);
 }
 
 }  // namespace
