@@ -54,6 +54,7 @@ std::vector<f64::Harmonics> fitOf(std::span<const f64::Harmonics> rays) {
 struct Blocked {
     uint32_t triangle;
     uint16_t ray;
+    bool isDark;                      // it meets the triangle's back
     std::array<uint16_t, 2> weights;  // of the triangle's second and third corner, 0 to 65535
 };
 
@@ -82,7 +83,7 @@ public:
                 const dvec3 d = frame * directions_[i], from = scene_.positions[vertex] + lift_ * n;
                 const auto hit = options_.cast(from, d);
                 if (!hit) continue;
-                blocked_[vertex].push_back(blockedBy(*hit, i, from + hit->t * d));
+                blocked_[vertex].push_back(blockedBy(*hit, i, d, from + hit->t * d));
                 const f64::Harmonics lost = f64::harmonicsOf(d);
                 for (int k = 0; k < 16; ++k) open.c[k] -= lost.c[k] / options_.rays;
             }
@@ -97,7 +98,7 @@ public:
             double most = 0;
             for (size_t v = 0; v < next.size(); ++v) {
                 for (const Blocked& blocked : blocked_[v]) {
-                    const Row from = givenBack(blocked, v);
+                    const Row from = givenBack(blocked);
                     for (size_t k = 0; k < 16; ++k) next[v][k] += from[k] / options_.rays;
                 }
                 // Under light of radiance 1 from everywhere.
@@ -113,7 +114,7 @@ public:
         const glm::dmat3 frame = frameOf(scene_.normals[vertex]);
         std::array<Row, 16> local{};
         for (const Blocked& blocked : blocked_[vertex]) {
-            Row change = givenBack(blocked, vertex);
+            Row change = givenBack(blocked);
             const f64::Harmonics lost = f64::harmonicsOf(frame * directions_[blocked.ray]);
             for (size_t k = 0; k < 16; ++k) change[k] -= lost.c[k];
             for (size_t i = 0; i < 16; ++i)
@@ -136,7 +137,7 @@ private:
         return {turnedFromZ(n, {1, 0, 0}), turnedFromZ(n, {0, 1, 0}), turnedFromZ(n, {0, 0, 1})};
     }
 
-    [[nodiscard]] Blocked blockedBy(BaseHit hit, uint32_t ray, dvec3 at) const {
+    [[nodiscard]] Blocked blockedBy(BaseHit hit, uint32_t ray, dvec3 d, dvec3 at) const {
         const auto& t = scene_.triangles[hit.triangle];
         const dvec3 a = scene_.positions[t[0]], b = scene_.positions[t[1]] - a, c = scene_.positions[t[2]] - a;
         const dvec3 normal = glm::cross(b, c), p = at - a;
@@ -146,16 +147,15 @@ private:
             second = std::clamp(glm::dot(glm::cross(p, c), normal) / area2, 0.0, 1.0);
             third = std::clamp(glm::dot(glm::cross(b, p), normal) / area2, 0.0, 1 - second);
         }
-        return {hit.triangle, uint16_t(ray), {uint16_t(65535 * second), uint16_t(65535 * third)}};
+        return {
+            hit.triangle, uint16_t(ray), glm::dot(d, normal) >= 0, {uint16_t(65535 * second), uint16_t(65535 * third)}};
     }
 
     /// Returns what comes back from where a ray meets a base.
-    [[nodiscard]] Row givenBack(const Blocked& blocked, size_t vertex) const {
+    [[nodiscard]] Row givenBack(const Blocked& blocked) const {
         Row row{};
+        if (blocked.isDark) return row;
         const auto& t = scene_.triangles[blocked.triangle];
-        const dvec3 a = scene_.positions[t[0]],
-                    normal = glm::cross(scene_.positions[t[1]] - a, scene_.positions[t[2]] - a);
-        if (glm::dot(frameOf(scene_.normals[vertex]) * directions_[blocked.ray], normal) >= 0) return row;
         const double second = blocked.weights[0] / 65535.0, third = blocked.weights[1] / 65535.0;
         const double weights[] = {1 - second - third, second, third};
         for (size_t corner = 0; corner < 3; ++corner)

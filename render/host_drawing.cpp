@@ -149,7 +149,20 @@ uint64_t bytesOf(std::span<const PreparedSurface> surfaces) {
     return sum;
 }
 
-Result<HostPicture> drawOnHost(std::span<const HostDataset> datasets, std::span<const PreparedSurface> surfaces,
+namespace {
+
+/// Returns the light over a surface's base, which is made anew where the surroundings are others.
+std::span<const uint64_t> baseLightOf(PreparedSurface& surface, const std::array<glm::vec4, 16>& harmonics) {
+    if (surface.baseLightOf != harmonics) {
+        surface.baseLight = surface.surface->baseTransfer->lightTexels(harmonics);
+        surface.baseLightOf = harmonics;
+    }
+    return surface.baseLight;
+}
+
+}  // namespace
+
+Result<HostPicture> drawOnHost(std::span<const HostDataset> datasets, std::span<PreparedSurface> surfaces,
                                const FrameRequest& request, const std::function<bool()>& cancel) {
     const HostCastOptions options{.cancel = cancel};
     HostPicture picture({int(request.width), int(request.height)}, backgroundRows(request));
@@ -161,18 +174,14 @@ Result<HostPicture> drawOnHost(std::span<const HostDataset> datasets, std::span<
         layers.push_back(layerOf(each, request));
     }
     std::vector<HostSurface> drawn;
-    std::vector<std::vector<uint64_t>> baseLights(surfaces.size());
-    for (const PreparedSurface& each : surfaces) {
+    for (PreparedSurface& each : surfaces) {
         const meso::Shell& shell = each.surface->shell;
         drawn.push_back(
             {*each.surface->arrays, shell, each.look.view, *each.words, each.look.textures, each.look.isFarDrawn, {}});
         HostSurface& made = drawn.back();
         setPicture(made.view, shell.origin + movedBy(request, drawn.size() - 1), request);
-        if (made.view.hasBaseLight != 0 && readsTransfer(request.shading)) {
-            std::vector<uint64_t>& texels = baseLights[drawn.size() - 1];
-            texels = each.surface->baseTransfer->lightTexels(made.view.harmonics);
-            made.baseLight = texels;
-        }
+        if (made.view.hasBaseLight != 0 && readsTransfer(request.shading))
+            made.baseLight = baseLightOf(each, std::to_array(made.view.harmonics));
     }
     VCP_TRY(drawLayers(layers, drawn, datasets, request, options, picture));
     if (request.sample == 0) tell(placed, layers, picture);

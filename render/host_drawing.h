@@ -5,7 +5,9 @@
 // levels are not drawn (docs/rays.md): each is refused as Unsupported, and never left out.
 #pragma once
 
+#include <array>
 #include <functional>
+#include <optional>
 #include <span>
 
 #include "render/host/host_picture.h"
@@ -35,6 +37,9 @@ struct PreparedSurface {
     const MesoSurface* surface;
     MesoLook look;                                       ///< without words
     std::shared_ptr<const std::vector<uint64_t>> words;  ///< the look's; surfaces of one look share them
+    /// The light over its base, as it was drawn last, and the surroundings that it is of.
+    std::vector<uint64_t> baseLight = {};
+    std::optional<std::array<glm::vec4, 16>> baseLightOf = {};
 };
 /// Prepares surfaces. Errors: Unsupported, where one is remeshed.
 Result<std::vector<PreparedSurface>> prepareOnHost(std::span<const MesoSurface> surfaces);
@@ -42,8 +47,9 @@ Result<std::vector<PreparedSurface>> prepareOnHost(std::span<const MesoSurface> 
 uint64_t bytesOf(std::span<const PreparedSurface> surfaces);
 
 /// Draws the cuts of datasets and the surfaces, the nearest at each pixel, and tells the residencies what the rays of a
-/// first sample hit. `cancel` is asked by several threads. Preconditions: checkHostDraws. Errors: Cancelled, Limit.
-Result<HostPicture> drawOnHost(std::span<const HostDataset> datasets, std::span<const PreparedSurface> surfaces,
+/// first sample hit. The surfaces keep the light over their bases. `cancel` is asked by several threads. Preconditions:
+/// checkHostDraws. Errors: Cancelled, Limit.
+Result<HostPicture> drawOnHost(std::span<const HostDataset> datasets, std::span<PreparedSurface> surfaces,
                                const FrameRequest& request, const std::function<bool()>& cancel);
 
 /// Returns the numbers of the cuts that drawOnHost would draw now: pictures of the same ones are the same.

@@ -6,8 +6,12 @@
 
 namespace vcp {
 
+double RecentFrames::least() const {
+    return *std::min_element(ms_.begin(), ms_.begin() + long(std::min(taken_, ms_.size())));
+}
+
 void MovingSize::take(int reduction, double fullMs) {
-    fullMs_[frames_++ % kRemembered] = fullMs;
+    fullMs_.take(fullMs);
     calm_ = reduction == reduction_ && reductionFor(fullMs, kRoom * frameMs_) < reduction_ ? calm_ + 1 : 0;
 }
 
@@ -19,9 +23,8 @@ void MovingSize::rest() {
 }
 
 int MovingSize::next(bool isNew) {
-    if (frameMs_ <= 0 || !isNew || frames_ == 0) return reduction_;
-    const auto known = fullMs_.begin() + long(std::min(frames_, kRemembered));
-    const int wanted = reductionFor(*std::min_element(fullMs_.begin(), known), frameMs_);
+    if (frameMs_ <= 0 || !isNew || fullMs_.areNone()) return reduction_;
+    const int wanted = reductionFor(fullMs_.least(), frameMs_);
     if (wanted > reduction_) {
         if (std::exchange(hasTried_, false)) patience_ *= 3;
         reduction_ = wanted;
@@ -33,11 +36,6 @@ int MovingSize::next(bool isNew) {
     }
     calm_ = 0;
     return reduction_;
-}
-
-bool MovingOcclusion::keeps() const {
-    const auto known = fullMs_.begin() + long(std::min(frames_, kRemembered));
-    return std::any_of(fullMs_.begin(), known, [this](double ms) { return ms <= mostMs_; });
 }
 
 int MovingSize::reductionFor(double fullMs, double frameMs) const {

@@ -6,6 +6,19 @@
 
 namespace vcp {
 
+/// What the last frames of a kind took, three at most: one that is slow by itself does not show in the least.
+class RecentFrames {
+public:
+    void take(double ms) { ms_[taken_++ % ms_.size()] = ms; }
+    [[nodiscard]] bool areNone() const { return taken_ == 0; }
+    /// Precondition: there are some.
+    [[nodiscard]] double least() const;
+
+private:
+    std::array<double, 3> ms_{};
+    size_t taken_ = 0;
+};
+
 /// Decides from frame to frame by how much the width and the height of moving pictures are reduced. A slow frame by
 /// itself changes nothing; pictures become smaller where three in a row were too slow, and larger where that may do
 /// after many in a row. Where that was in vain, the next attempt waits three times as long: sizes must not flicker.
@@ -26,15 +39,13 @@ public:
     int next(bool isNew);
 
 private:
-    static constexpr size_t kRemembered = 3;
     static constexpr int kPatience = 10;
     static constexpr double kRoom = 1.2;  // of the time, that a larger picture may seem to take: it takes less
 
     [[nodiscard]] int reductionFor(double fullMs, double frameMs) const;
 
     double frameMs_;
-    std::array<double, kRemembered> fullMs_{};  // of the last frames
-    size_t frames_ = 0;
+    RecentFrames fullMs_;
     int reduction_ = 1;
     int calm_ = 0;              // frames in a row after which a larger one may do
     int patience_ = kPatience;  // so many make pictures larger
@@ -50,16 +61,14 @@ public:
     explicit MovingOcclusion(double frameMs) : mostMs_(kPart * frameMs) {}
 
     /// Takes in a frame with occlusion. `fullMs`: as in MovingSize::take.
-    void take(double fullMs) { fullMs_[frames_++ % kRemembered] = fullMs; }
-    [[nodiscard]] bool keeps() const;
+    void take(double fullMs) { fullMs_.take(fullMs); }
+    [[nodiscard]] bool keeps() const { return !fullMs_.areNone() && fullMs_.least() <= mostMs_; }
 
 private:
-    static constexpr size_t kRemembered = 3;
     static constexpr double kPart = 0.6;
 
     double mostMs_;
-    std::array<double, kRemembered> fullMs_{};  // of the last frames with occlusion
-    size_t frames_ = 0;
+    RecentFrames fullMs_;  // with occlusion
 };
 
 }  // namespace vcp

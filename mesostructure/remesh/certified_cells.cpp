@@ -28,14 +28,9 @@ constexpr size_t kMostKnown = 64;
 constexpr double kNarrowestPixels = 0.5;  // of a cell
 constexpr double kNothing = std::numeric_limits<double>::infinity();
 
-dvec2 texelsOf(const HeightLevels& heights) {
-    const glm::ivec2 size = heights.levels().front().size;
-    return {size.x, size.y / heights.rows()};
-}
-
 /// Returns log2 of the texels along a patch's edge.
 int patchEdge(const RemeshSurface& surface) {
-    const dvec2 texels = texelsOf(*surface.heights);
+    const dvec2 texels = surface.heights->texels();
     double area = 0;
     for (const auto& uvs : surface.uvs) {
         const dvec2 a = (dvec2(uvs[1]) - dvec2(uvs[0])) * texels, b = (dvec2(uvs[2]) - dvec2(uvs[0])) * texels;
@@ -63,7 +58,7 @@ Result<CertifiedCells> CertifiedCells::create(const RemeshSurface& surface) {
     made.finest_ = std::min(kLog2FinestCells, kLog2MostCells - edge);
     made.coarsest_ = edge + made.finest_;
     VCP_TRY_ASSIGN(made.patches_, cutSurface(surface, std::exp2(edge), kMostPatches));
-    const dvec2 texels = texelsOf(*surface.heights) * std::exp2(made.finest_);
+    const dvec2 texels = surface.heights->texels() * std::exp2(made.finest_);
     for (const auto& uvs : made.patches_.uvs) {
         std::array<dvec2, 3> at;
         for (size_t k = 0; k < 3; ++k) at[k] = glm::floor(dvec2(uvs[k]) * texels + 0.5);

@@ -55,7 +55,7 @@ double deviationIn(const HeightLevel& map, int i, int j, const Part& part) {
 
 double heightDeviation(const HeightLevels& levels, const std::array<HeightCorner, 3>& corners, double enough) {
     const HeightLevel& map = levels.levels().front();
-    const glm::dvec2 texels(map.size.x, map.size.y / levels.rows());
+    const glm::dvec2 texels = levels.texels();
     Part whole;
     whole.count = 3;
     for (size_t k = 0; k < 3; ++k) whole.corners[k] = {corners[k].at * texels, corners[k].height};

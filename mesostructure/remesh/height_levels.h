@@ -56,6 +56,8 @@ public:
     [[nodiscard]] const std::vector<HeightLevel>& levels() const { return levels_; }
     [[nodiscard]] const std::vector<LevelVolume>& volumes() const { return volumes_; }  ///< for each level
     [[nodiscard]] double rows() const { return rows_; }  ///< extent of the tile along y, tile units
+    /// Texels of the map a tile unit, along x and y.
+    [[nodiscard]] glm::dvec2 texels() const { return {levels_.front().size.x, levels_.front().size.y / rows_}; }
     [[nodiscard]] uint64_t bytes() const;
 
     /// Returns the height of a level at a place in tile units, bilinear.

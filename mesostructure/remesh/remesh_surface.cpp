@@ -105,9 +105,7 @@ void addPlaces(RemeshSurface& surface) {
 class Cutting {
 public:
     Cutting(const RemeshSurface& from, double mostTexels, uint64_t mostTriangles)
-        : most_(mostTexels), mostTriangles_(mostTriangles), cut_(from) {
-        const glm::ivec2 size = from.heights->levels().front().size;
-        texels_ = {size.x, size.y / from.heights->rows()};
+        : most_(mostTexels), mostTriangles_(mostTriangles), texels_(from.heights->texels()), cut_(from) {
         cut_.triangles.clear(), cut_.uvs.clear(), cut_.seams.clear(), cut_.seamUvs.clear(), cut_.places.clear();
     }
 

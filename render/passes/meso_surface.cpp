@@ -189,7 +189,7 @@ void MesoSurfacePass::fillBaseLight(const Placed& surface, MesoTarget::Drawing::
     if (harmonics == light.of) return;
     const std::vector<uint64_t> texels = surface.baseTransfer->lightTexels(harmonics);
     std::memcpy(light.filled.mapped(), texels.data(), texels.size() * sizeof(uint64_t));
-    light.of = harmonics;
+    light.of = harmonics, light.isCopied = false;
 }
 
 bool MesoSurfacePass::keepsTransfer(const Shading& shading) const {
@@ -224,7 +224,7 @@ MesoReport MesoTarget::report() const {
     return report;
 }
 
-void MesoSurfacePass::recordHits(VkCommandBuffer commands, const MesoTarget& target, const FrameRequest& request,
+void MesoSurfacePass::recordHits(VkCommandBuffer commands, MesoTarget& target, const FrameRequest& request,
                                  const Picture& picture) {
     const uint64_t plane = target.size.pixels() * 4;
     const VkBufferCopy region{0, 0, plane};
@@ -234,8 +234,8 @@ void MesoSurfacePass::recordHits(VkCommandBuffer commands, const MesoTarget& tar
     for (size_t i = 0; i < surfaces_.size(); ++i) {
         const MesoConstants constants = constantsOf(i, request);
         vkCmdUpdateBuffer(commands, target.drawings[i].constants.handle(), 0, sizeof constants, &constants);
-        const MesoTarget::Drawing::BaseLight& light = target.drawings[i].baseLight;
-        if (light.filled.bytes() == 0) continue;
+        MesoTarget::Drawing::BaseLight& light = target.drawings[i].baseLight;
+        if (light.filled.bytes() == 0 || std::exchange(light.isCopied, true)) continue;
         const VkBufferCopy all{0, 0, light.filled.bytes()};
         vkCmdCopyBuffer(commands, light.filled.handle(), light.texels.buffer.handle(), 1, &all);
     }

@@ -45,8 +45,9 @@ struct MesoTarget {
         /// The light over the surface's base; empty where it is that of the surroundings.
         struct BaseLight {
             MesoTexels texels;
-            Buffer filled;                   ///< what is copied to them
-            std::array<glm::vec4, 16> of{};  ///< the surroundings that it was filled for
+            Buffer filled;                                ///< what is copied to them
+            std::optional<std::array<glm::vec4, 16>> of;  ///< the surroundings that it was filled for
+            bool isCopied = false;                        ///< a recorded frame copies what was filled
         } baseLight;
         MesoSet set;
         VkPipeline cast = VK_NULL_HANDLE, shadow = VK_NULL_HANDLE, sun = VK_NULL_HANDLE, sky = VK_NULL_HANDLE;
@@ -85,8 +86,7 @@ public:
     /// in flight uses the target. Errors: Device, Limit, Unsupported.
     Result<void> prepare(MesoTarget& target, const Picture& picture, const FrameRequest& request);
     /// Records what finds the hits. Precondition: prepare() with the same picture.
-    void recordHits(VkCommandBuffer commands, const MesoTarget& target, const FrameRequest& request,
-                    const Picture& picture);
+    void recordHits(VkCommandBuffer commands, MesoTarget& target, const FrameRequest& request, const Picture& picture);
     /// Records a ray of light from all that the picture shows. `ray.isLast`: nothing comes after the surfaces.
     /// Precondition: recordHits() with planes of light.
     void recordRay(VkCommandBuffer commands, const MesoTarget& target, const frame::MesoLightRay& ray);

@@ -220,7 +220,7 @@ MesoSurfacePass::Picture Renderer::View::underSurfaces(const Frame& frame) {
             frame.isLit ? frame.target.light() : nullptr};
 }
 
-void Renderer::View::recordSurfaceHits(VkCommandBuffer commands, const Frame& frame) const {
+void Renderer::View::recordSurfaceHits(VkCommandBuffer commands, Frame& frame) const {
     frame.surfacesTimer.reset(commands);
     frame.surfacesTimer.mark(commands, 0);
     shared->meso->pass->recordHits(commands, frame.surfaces, frame.request, underSurfaces(frame));

@@ -75,8 +75,8 @@ struct Renderer::Shared {
     /// Uploads the copies of the surfaces to the device. After an error there are none.
     Result<void> uploadSurfaces();
     /// Returns the surfaces as the processor draws them; nothing where it does not, or where there are none.
-    [[nodiscard]] std::span<const PreparedSurface> preparedSurfaces() const {
-        return meso ? std::span<const PreparedSurface>(meso->prepared) : std::span<const PreparedSurface>();
+    [[nodiscard]] std::span<PreparedSurface> preparedSurfaces() {
+        return meso ? std::span<PreparedSurface>(meso->prepared) : std::span<PreparedSurface>();
     }
     /// Bytes of the surfaces, which the budget pays for before pages.
     [[nodiscard]] uint64_t surfaceBytes() const { return meso && meso->pass ? meso->pass->assetBytes() : 0; }

@@ -235,7 +235,7 @@ struct Renderer::View {
     void recordShade(VkCommandBuffer commands, Frame& frame, size_t layer);
     /// Returns what the surfaces are drawn over.
     [[nodiscard]] static MesoSurfacePass::Picture underSurfaces(const Frame& frame);
-    void recordSurfaceHits(VkCommandBuffer commands, const Frame& frame) const;
+    void recordSurfaceHits(VkCommandBuffer commands, Frame& frame) const;
     void recordSurfaceRay(VkCommandBuffer commands, const Frame& frame, const frame::SceneRay& ray) const;
     /// Records the surfaces, over the datasets' picture; where they shade each other, what is left of them.
     Result<void> recordSurfaces(VkCommandBuffer commands, Frame& frame);
