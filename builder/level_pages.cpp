@@ -8,7 +8,7 @@
 #include <oneapi/tbb/parallel_for.h>
 
 #include "builder/page/exact_tree.h"
-#include "builder/slab/page_surface.h"
+#include "builder/slab/slab_tree.h"
 
 namespace vcp {
 
@@ -45,8 +45,8 @@ Result<BuiltPage> buildPage(const LevelSettings& settings, const LatticeMesh& me
                             std::span<const uint32_t> triangles, bool withSurface, size_t mostPieces) {
     VCP_TRY_ASSIGN(auto page, storedPage(settings, mesh, code, triangles));
     if (withSurface)
-        page.surface = storedSurface(
-            surfaceOf(mesh, triangles, mortonDecode(code), settings.grid.log2Cells, mostPieces), settings.codesSurface);
+        page.surface = surfaceToHandUp(
+            settings, surfaceOf(mesh, triangles, mortonDecode(code), settings.grid.log2Cells, mostPieces));
     return page;
 }
 
@@ -122,9 +122,9 @@ PageWork countedWork(const LevelSettings& settings, const LatticeMesh& mesh, uin
     const uint64_t records = buildExactTree(mesh, triangles, page, log2Cells).records();
     const uint64_t exact = exactPageWorkBytes(triangles.size(), mostVertices(mesh, triangles), records);
     if (!withSurface) return {exact};
-    const uint64_t halves = halvesTouched(mesh, triangles, page, log2Cells);
+    const uint64_t quarters = quartersTouched(mesh, triangles, page, log2Cells);
     const Extents extents = extentsOf(mesh, triangles, settings.grid.edgeCells() + 2 * kExactMarginCells);
-    const uint64_t surface = surfaceWorkBytes(triangles.size(), extents.area, extents.perimeter, halves, kFewPieces);
+    const uint64_t surface = surfaceWorkBytes(triangles.size(), extents.area, extents.perimeter, quarters, kFewPieces);
     return {std::max(exact, surface), kFewPieces};
 }
 
@@ -164,6 +164,13 @@ Result<BuiltPage> builtPage(const LevelSettings& settings, uint64_t code, const 
         VCP_TRY_ASSIGN(page.stored, compressPage(encoded.draft, encoded.colour));
     }
     return page;
+}
+
+StoredPage surfaceToHandUp(const LevelSettings& settings, SurfaceCells quarters) {
+    PageSurface surface = foldSurface(std::move(quarters));
+    std::vector<CellSlab> slabs = slabsOf(surface, settings.withColour);
+    surface.quarters = {};
+    return storedSurface({std::move(surface.halves), std::move(slabs)}, settings.codesSurface);
 }
 
 Result<void> buildPages(const LevelSettings& settings, const LatticeMesh& mesh, const TriangleBins& bins,

@@ -1,15 +1,12 @@
 #include "builder/slab/page_surface.h"
 
 #include <algorithm>
-#include <array>
-#include <bit>
-#include <cstring>
+#include <bitset>
+#include <utility>
 
 #include <glm/common.hpp>
 
 #include "builder/slab/triangle_cutter.h"
-#include "builder/spill/record_coder.h"
-#include "octree/surface/leaf_math.h"
 
 namespace vcp {
 
@@ -82,132 +79,41 @@ private:
 SurfaceCells surfaceOf(const LatticeMesh& mesh, std::span<const uint32_t> triangles, glm::u32vec3 page,
                        uint32_t log2Cells, size_t mostPieces) {
     const glm::i32vec3 origin = glm::i32vec3(page) * (kLatticePerCell << log2Cells);
-    const int depth = int(log2Cells) + 1;
-    SurfaceCells halves;
-    SurfaceCutter(mesh, origin, depth, mostPieces).run(triangles, {glm::ivec3(0), depth}, halves);
-    return halves;
+    const int depth = int(log2Cells) + 2;
+    SurfaceCells quarters;
+    SurfaceCutter(mesh, origin, depth, mostPieces).run(triangles, {glm::ivec3(0), depth}, quarters);
+    return quarters;
 }
 
-uint64_t halvesTouched(const LatticeMesh& mesh, std::span<const uint32_t> triangles, glm::u32vec3 page,
-                       uint32_t log2Cells) {
-    constexpr int kHalf = kLatticePerCell / 2;
+uint64_t quartersTouched(const LatticeMesh& mesh, std::span<const uint32_t> triangles, glm::u32vec3 page,
+                         uint32_t log2Cells) {
+    constexpr int kQuarter = kLatticePerCell / 4;
     const glm::i32vec3 origin = glm::i32vec3(page) * (kLatticePerCell << log2Cells);
-    const int edge = 2 << log2Cells;
-    std::vector<uint64_t> rows(size_t(edge) * size_t(edge));
+    const int edge = 4 << log2Cells;
+    constexpr size_t kMostEdge = 128;
+    std::vector<std::bitset<kMostEdge>> rows(size_t(edge) * size_t(edge));
     for (const uint32_t k : triangles) {
         const auto& [a, b, c] = mesh.triangles[k];
         const glm::i32vec3 p = mesh.positions[a], q = mesh.positions[b], r = mesh.positions[c];
-        // Closed boxes touch the half cells on both sides of a wall that they lie in.
-        const glm::i32vec3 low = glm::max((glm::min(p, glm::min(q, r)) - origin - 1) / kHalf, 0);
-        const glm::i32vec3 high = glm::min((glm::max(p, glm::max(q, r)) - origin) / kHalf, edge - 1);
+        // Closed boxes touch the quarters on both sides of a wall that they lie in.
+        const glm::i32vec3 low = glm::max((glm::min(p, glm::min(q, r)) - origin - 1) / kQuarter, 0);
+        const glm::i32vec3 high = glm::min((glm::max(p, glm::max(q, r)) - origin) / kQuarter, edge - 1);
         if (high.x < low.x) continue;
-        const uint64_t row = ~uint64_t{0} >> (63 - (high.x - low.x)) << low.x;
+        const auto row = ~std::bitset<kMostEdge>() >> (kMostEdge - 1 - size_t(high.x - low.x)) << size_t(low.x);
         for (int z = low.z; z <= high.z; ++z)
             for (int y = low.y; y <= high.y; ++y) rows[size_t(z * edge + y)] |= row;
     }
-    uint64_t halves = 0;
-    for (const uint64_t row : rows) halves += uint64_t(std::popcount(row));
-    return halves;
+    uint64_t quarters = 0;
+    for (const auto& row : rows) quarters += row.count();
+    return quarters;
 }
 
-PageFold::PageFold(uint32_t log2Cells, size_t halves) : log2Cells_(log2Cells) { reserve(above_.quarters, halves); }
-
-void PageFold::add(const SurfaceCells& halves, uint32_t octant) {
-    SurfaceCells& quarters = above_.quarters;
-    for (const uint32_t code : halves.codes) quarters.codes.push_back(octant << 3 * (log2Cells_ + 1) | code);
-    quarters.cells.insert(quarters.cells.end(), halves.cells.begin(), halves.cells.end());
-}
-
-PageSurface PageFold::take() {
-    above_.halves = foldCells(above_.quarters);
-    above_.cells = foldCells(above_.halves);
-    return std::move(above_);
-}
-
-namespace {
-
-/// So many cells are coded at a time.
-constexpr size_t kBlockCells = 4096;
-
-/// A cell on temporary files: all of CellSurface but the axis.
-struct StoredCell {
-    uint32_t code = 0;
-    glm::vec3 lower{0}, upper{0};
-    float first = 0, last = 0, area = 0;
-    std::array<float, 6> moment{};
-    glm::vec4 light{0};
-    uint32_t parts = 0;
-};
-static_assert(sizeof(StoredCell) == 84 && sizeof(CellSurface) == sizeof(StoredCell) - sizeof(uint32_t) + 12);
-
-}  // namespace
-
-size_t storedCells(uint64_t geometryBytes) { return geometryBytes / sizeof(StoredCell); }
-
-StoredPage storedSurface(const SurfaceCells& cells, bool isCoded) {
-    StoredPage stored;
-    stored.geometryBytes = uint32_t(cells.size() * sizeof(StoredCell));
-    std::vector<StoredCell> block;
-    for (size_t first = 0; first < cells.size(); first += block.size()) {
-        block.resize(std::min(kBlockCells, cells.size() - first));
-        for (size_t i = 0; i < block.size(); ++i) {
-            const CellSurface& c = cells.cells[first + i];
-            block[i] = {cells.codes[first + i], c.lower, c.upper, c.first, c.last, c.area, c.moment, c.light, c.parts};
-        }
-        const auto bytes = std::as_bytes(std::span(block));
-        const size_t at = stored.geometry.size(), begin = at + sizeof(uint32_t);
-        stored.geometry.resize(begin);
-        if (!isCoded || !codeRecords(bytes, sizeof(StoredCell), stored.geometry))
-            stored.geometry.insert(stored.geometry.end(), bytes.begin(), bytes.end());
-        const auto blockBytes = uint32_t(stored.geometry.size() - begin);
-        std::memcpy(stored.geometry.data() + at, &blockBytes, sizeof blockBytes);
-    }
-    return stored;
-}
-
-namespace {
-
-/// Takes the first block off `stored`, to `cells`. Returns false where it is not what was stored.
-bool takeBlock(std::span<const std::byte>& stored, std::span<StoredCell> cells) {
-    uint32_t blockBytes = 0;
-    if (stored.size() < sizeof blockBytes) return false;
-    std::memcpy(&blockBytes, stored.data(), sizeof blockBytes);
-    stored = stored.subspan(sizeof blockBytes);
-    if (stored.size() < blockBytes) return false;
-    const std::span<const std::byte> block = stored.first(blockBytes);
-    stored = stored.subspan(blockBytes);
-    const auto bytes = std::as_writable_bytes(cells);
-    if (block.size() != bytes.size()) return decodeRecords(block, sizeof(StoredCell), bytes);
-    std::ranges::copy(block, bytes.begin());
-    return true;
-}
-
-}  // namespace
-
-std::optional<SurfaceCells> surfaceFrom(const StoredPage& stored) {
-    std::span<const std::byte> left = stored.geometry;
-    const size_t count = storedCells(stored.geometryBytes);
-    SurfaceCells cells;
-    reserve(cells, count);
-    std::vector<StoredCell> block;
-    while (cells.size() < count) {
-        block.resize(std::min(kBlockCells, count - cells.size()));
-        if (!takeBlock(left, block)) return std::nullopt;
-        for (const StoredCell& s : block) {
-            cells.codes.push_back(s.code);
-            cells.cells.push_back({.lower = s.lower,
-                                   .upper = s.upper,
-                                   .first = s.first,
-                                   .last = s.last,
-                                   .area = s.area,
-                                   .moment = s.moment,
-                                   .light = s.light,
-                                   .parts = s.parts});
-            chooseAxis(cells.cells.back());
-        }
-    }
-    if (!left.empty()) return std::nullopt;
-    return cells;
+PageSurface foldSurface(SurfaceCells quarters) {
+    PageSurface surface;
+    surface.quarters = std::move(quarters);
+    surface.halves = foldCells(surface.quarters);
+    surface.cells = foldCells(surface.halves);
+    return surface;
 }
 
 }  // namespace vcp

@@ -87,7 +87,7 @@ TriangleCutter::Source TriangleCutter::sourceOf(uint32_t triangle) const {
     Source source;
     source.parts = mesh_.kindOf(triangle);
     for (size_t i = 0; i < 3; ++i)
-        source.corners[i] = glm::dvec3(mesh_.positions[t[i]] - origin_) * (2.0 / double(kLatticePerCell));
+        source.corners[i] = glm::dvec3(mesh_.positions[t[i]] - origin_) * (4.0 / double(kLatticePerCell));
     const auto& [a, b, c] = source.corners;
     const glm::dvec3 cross = glm::cross(b - a, c - a);
     const double squared = glm::dot(cross, cross);
@@ -103,7 +103,7 @@ TriangleCutter::Source TriangleCutter::sourceOf(uint32_t triangle) const {
 }
 
 bool TriangleCutter::mayReach(uint32_t triangle) const {
-    constexpr int kSteps = kLatticePerCell / 2;  // an edge of the cutter's cells
+    constexpr int kSteps = kLatticePerCell / 4;  // an edge of the cutter's cells
     const auto& [a, b, c] = mesh_.triangles[triangle];
     const glm::i32vec3 &p = mesh_.positions[a], &q = mesh_.positions[b], &r = mesh_.positions[c];
     // The last page of the largest grid ends beyond 31 bits.

@@ -26,7 +26,7 @@ struct CutterBox {
 class TriangleCutter {
 public:
     /// `origin`: the page's lowest corner on the lattice; the page has 2^depth of the cutter's cells an edge, of which
-    /// two are as long as one cell of the mesh's level. `within`: the box of the page that pieces are kept of.
+    /// four are as long as one cell of the mesh's level. `within`: the box of the page that pieces are kept of.
     TriangleCutter(const LatticeMesh& mesh, glm::i32vec3 origin, int depth, CutterBox within)
         : mesh_(mesh), origin_(origin), depth_(depth), within_(within) {}
 
