@@ -122,9 +122,9 @@ PageWork countedWork(const LevelSettings& settings, const LatticeMesh& mesh, uin
     const uint64_t records = buildExactTree(mesh, triangles, page, log2Cells).records();
     const uint64_t exact = exactPageWorkBytes(triangles.size(), mostVertices(mesh, triangles), records);
     if (!withSurface) return {exact};
-    const uint64_t quarters = quartersTouched(mesh, triangles, page, log2Cells);
+    const uint64_t halves = halvesTouched(mesh, triangles, page, log2Cells);
     const Extents extents = extentsOf(mesh, triangles, settings.grid.edgeCells() + 2 * kExactMarginCells);
-    const uint64_t surface = surfaceWorkBytes(triangles.size(), extents.area, extents.perimeter, quarters, kFewPieces);
+    const uint64_t surface = surfaceWorkBytes(triangles.size(), extents.area, extents.perimeter, halves, kFewPieces);
     return {std::max(exact, surface), kFewPieces};
 }
 
@@ -166,8 +166,7 @@ Result<BuiltPage> builtPage(const LevelSettings& settings, uint64_t code, const 
     return page;
 }
 
-StoredPage surfaceToHandUp(const LevelSettings& settings, SurfaceCells quarters) {
-    PageSurface surface = foldSurface(std::move(quarters));
+StoredPage surfaceToHandUp(const LevelSettings& settings, PageSurface surface) {
     std::vector<CellSlab> slabs = slabsOf(surface, settings.withColour);
     surface.quarters = {};
     return storedSurface({std::move(surface.halves), std::move(slabs)}, settings.codesSurface);

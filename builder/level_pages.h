@@ -34,9 +34,8 @@ struct LevelSettings {
 /// holds more than a page can name).
 Result<BuiltPage> builtPage(const LevelSettings& settings, uint64_t code, const EncodedPage& encoded);
 
-/// Returns what a page hands up to the page above it, as temporary files keep it. `quarters`: the surface in the
-/// quarters of its cells.
-StoredPage surfaceToHandUp(const LevelSettings& settings, SurfaceCells quarters);
+/// Returns what a page hands up to the page above it, as temporary files keep it.
+StoredPage surfaceToHandUp(const LevelSettings& settings, PageSurface surface);
 
 /// Builds the pages of `bins`, numbers in the bin's mesh, and appends those with surface to `spool`; where `surfaces`
 /// is not null, it takes the surface in each page, from which the level above is made (slab_pages.h). `progress` is

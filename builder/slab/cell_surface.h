@@ -25,6 +25,14 @@ struct CellSurface {
     uint32_t parts = 0;             ///< kinds of parts that it belongs to, as PageEntry's
 };
 
+/// What is known of the surface in an eighth of a cell that is cut no finer; as in CellSurface. Area and light are 0 in
+/// meshes without colour.
+struct EighthSurface {
+    glm::vec3 lower{1}, upper{-1};
+    float area = 0;
+    glm::vec4 light{0};
+};
+
 /// The values between which something lies.
 struct Extent {
     double first, last;

@@ -1,8 +1,7 @@
 #include "builder/slab/page_surface.h"
 
 #include <algorithm>
-#include <bitset>
-#include <utility>
+#include <bit>
 
 #include <glm/common.hpp>
 
@@ -50,21 +49,21 @@ public:
     SurfaceCutter(const LatticeMesh& mesh, glm::i32vec3 origin, int depth, size_t mostPieces)
         : mesh_(mesh), origin_(origin), depth_(depth), mostPieces_(mostPieces) {}
 
-    /// Appends the cells of a box, in Morton order.
-    void run(std::span<const uint32_t> triangles, CutterBox box, SurfaceCells& cells) const {
-        if (cutAll(triangles, box, cells)) return;
-        for (int octant = 0; octant < 8; ++octant) run(triangles, box.child(octant), cells);
+    /// Appends the half cells of a box and their eighths, in Morton order.
+    void run(std::span<const uint32_t> triangles, CutterBox box, PageSurface& surface) const {
+        if (cutAll(triangles, box, surface)) return;
+        for (int octant = 0; octant < 8; ++octant) run(triangles, box.child(octant), surface);
     }
 
 private:
     /// Returns false, and appends nothing, where there are too many pieces.
-    bool cutAll(std::span<const uint32_t> triangles, CutterBox box, SurfaceCells& cells) const {
+    bool cutAll(std::span<const uint32_t> triangles, CutterBox box, PageSurface& surface) const {
         TriangleCutter cutter(mesh_, origin_, depth_, box);
         for (const uint32_t k : triangles) {
             cutter.cut(k);
             if (cutter.pieces() > mostPieces_ && box.log2Edge > 0) return false;
         }
-        cutter.appendTo(cells);
+        cutter.appendTo(surface.halves, surface.quarters);
         return true;
     }
 
@@ -76,43 +75,45 @@ private:
 
 }  // namespace
 
-SurfaceCells surfaceOf(const LatticeMesh& mesh, std::span<const uint32_t> triangles, glm::u32vec3 page,
-                       uint32_t log2Cells, size_t mostPieces) {
+PageSurface surfaceOf(const LatticeMesh& mesh, std::span<const uint32_t> triangles, glm::u32vec3 page,
+                      uint32_t log2Cells, size_t mostPieces) {
     const glm::i32vec3 origin = glm::i32vec3(page) * (kLatticePerCell << log2Cells);
-    const int depth = int(log2Cells) + 2;
-    SurfaceCells quarters;
-    SurfaceCutter(mesh, origin, depth, mostPieces).run(triangles, {glm::ivec3(0), depth}, quarters);
-    return quarters;
+    const int depth = int(log2Cells) + 1;
+    PageSurface surface;
+    SurfaceCutter(mesh, origin, depth, mostPieces).run(triangles, {glm::ivec3(0), depth}, surface);
+    surface.cells = foldCells(surface.halves);
+    return surface;
 }
 
-uint64_t quartersTouched(const LatticeMesh& mesh, std::span<const uint32_t> triangles, glm::u32vec3 page,
-                         uint32_t log2Cells) {
-    constexpr int kQuarter = kLatticePerCell / 4;
+uint64_t halvesTouched(const LatticeMesh& mesh, std::span<const uint32_t> triangles, glm::u32vec3 page,
+                       uint32_t log2Cells) {
+    constexpr int kHalf = kLatticePerCell / 2;
     const glm::i32vec3 origin = glm::i32vec3(page) * (kLatticePerCell << log2Cells);
-    const int edge = 4 << log2Cells;
-    constexpr size_t kMostEdge = 128;
-    std::vector<std::bitset<kMostEdge>> rows(size_t(edge) * size_t(edge));
+    const int edge = 2 << log2Cells;
+    std::vector<uint64_t> rows(size_t(edge) * size_t(edge));
     for (const uint32_t k : triangles) {
         const auto& [a, b, c] = mesh.triangles[k];
         const glm::i32vec3 p = mesh.positions[a], q = mesh.positions[b], r = mesh.positions[c];
-        // Closed boxes touch the quarters on both sides of a wall that they lie in.
-        const glm::i32vec3 low = glm::max((glm::min(p, glm::min(q, r)) - origin - 1) / kQuarter, 0);
-        const glm::i32vec3 high = glm::min((glm::max(p, glm::max(q, r)) - origin) / kQuarter, edge - 1);
+        // Closed boxes touch the half cells on both sides of a wall that they lie in.
+        const glm::i32vec3 low = glm::max((glm::min(p, glm::min(q, r)) - origin - 1) / kHalf, 0);
+        const glm::i32vec3 high = glm::min((glm::max(p, glm::max(q, r)) - origin) / kHalf, edge - 1);
         if (high.x < low.x) continue;
-        const auto row = ~std::bitset<kMostEdge>() >> (kMostEdge - 1 - size_t(high.x - low.x)) << size_t(low.x);
+        const uint64_t row = ~uint64_t{0} >> (63 - (high.x - low.x)) << low.x;
         for (int z = low.z; z <= high.z; ++z)
             for (int y = low.y; y <= high.y; ++y) rows[size_t(z * edge + y)] |= row;
     }
-    uint64_t quarters = 0;
-    for (const auto& row : rows) quarters += row.count();
-    return quarters;
+    uint64_t halves = 0;
+    for (const uint64_t row : rows) halves += uint64_t(std::popcount(row));
+    return halves;
 }
 
-PageSurface foldSurface(SurfaceCells quarters) {
+PageSurface foldSurface(const SurfaceCells& quarters) {
     PageSurface surface;
-    surface.quarters = std::move(quarters);
-    surface.halves = foldCells(surface.quarters);
+    surface.halves = foldCells(quarters);
     surface.cells = foldCells(surface.halves);
+    surface.quarters.codes = quarters.codes;
+    surface.quarters.eighths.reserve(quarters.size());
+    for (const CellSurface& c : quarters.cells) surface.quarters.eighths.push_back({c.lower, c.upper, c.area, c.light});
     return surface;
 }
 

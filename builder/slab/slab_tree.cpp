@@ -1,7 +1,6 @@
 #include "builder/slab/slab_tree.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 
@@ -18,51 +17,96 @@ namespace {
 
 class SlabMaker {
 public:
-    SlabMaker(const PageSurface& surface, bool withColour)
-        : levels_{&surface.cells, &surface.halves, &surface.quarters}, withColour_(withColour) {}
+    SlabMaker(const PageSurface& surface, bool withColour) : surface_(surface), withColour_(withColour) {}
 
     std::vector<CellSlab> run() {
-        slabs_.reserve(levels_[0]->size());
-        for (size_t i = 0; i < levels_[0]->size(); ++i) addCell(i);
+        const SurfaceCells& cells = surface_.cells;
+        slabs_.reserve(cells.size());
+        for (size_t i = 0; i < cells.size(); ++i) addCell(cells.codes[i], cells.cells[i]);
         return std::move(slabs_);
     }
 
 private:
-    /// A run of a list of cells.
+    /// A run of halves or quarters: the eighths of a cell or of a half.
     struct Run {
-        size_t first, end;
+        size_t first, count;
     };
 
-    /// Returns the eighths of a cell, as a run of the next list.
-    [[nodiscard]] Run eighthsOf(size_t level, size_t cell) const {
-        const std::vector<uint32_t>& codes = levels_[level + 1]->codes;
-        const uint32_t first = levels_[level]->codes[cell] << 3;
-        const auto begin = std::lower_bound(codes.begin(), codes.end(), first);
-        const auto end = std::lower_bound(begin, codes.end(), first + 8);
-        return {size_t(begin - codes.begin()), size_t(end - codes.begin())};
+    static Run eighthsOf(const std::vector<uint32_t>& codes, uint32_t of) {
+        const auto begin = std::lower_bound(codes.begin(), codes.end(), of << 3);
+        const auto end = std::lower_bound(begin, codes.end(), (of << 3) + 8);
+        return {size_t(begin - codes.begin()), size_t(end - begin)};
+    }
+    [[nodiscard]] Run quartersOf(size_t half) const {
+        return eighthsOf(surface_.quarters.codes, surface_.halves.codes[half]);
     }
 
-    void addCell(size_t cell) {
-        const Run halves = eighthsOf(0, cell);
-        CellSlab slab = slabOf(0, cell, halves);
-        if (isGood(slab, cell, halves)) return add(slab, 0, halves);
+    void addCell(uint32_t code, const CellSurface& cell) {
+        const Run run = eighthsOf(surface_.halves.codes, code);
+        const auto halves = std::span(surface_.halves.cells).subspan(run.first, run.count);
+        takeOctants(surface_.halves.codes, run);
+        const glm::dvec3 n = f64::decodeDirection(packSlabDirection(glm::dvec3(cell.axis)));
+        CellSlab slab = slabOf(cell, code << 3, extentAlong(halves, octants_, n));
+        if (isGood(slab, cell, run)) return add(slab, halves, 0);
         // Halves of cells are never parted: their error is small enough whatever lies in them.
-        for (size_t i = halves.first; i < halves.end; ++i) {
-            const Run quarters = eighthsOf(1, i);
-            add(slabOf(1, i, quarters), 1, quarters);
-        }
+        for (size_t i = run.first; i < run.first + run.count; ++i) addHalf(i);
     }
 
-    void add(CellSlab slab, size_t level, Run eighths) {
-        if (withColour_) addColourError(slab, level, eighths);
+    void addHalf(size_t i) {
+        const CellSurface& half = surface_.halves.cells[i];
+        const Run run = quartersOf(i);
+        takeOctants(surface_.quarters.codes, run);
+        const glm::dvec3 n = f64::decodeDirection(packSlabDirection(glm::dvec3(half.axis)));
+        CellSlab slab = slabOf(half, surface_.halves.codes[i], extentAlong(half, n));
+        slab.isHalf = 1;
+        add(slab, std::span(surface_.quarters.eighths).subspan(run.first, run.count), 1);
+    }
+
+    void takeOctants(const std::vector<uint32_t>& codes, Run run) {
+        octants_.clear();
+        for (size_t i = run.first; i < run.first + run.count; ++i) octants_.push_back(codes[i] & 7u);
+    }
+
+    /// Returns the slab of a cell or a half, whose eighths with surface are in octants_, with the error of any.
+    [[nodiscard]] CellSlab slabOf(const CellSurface& cell, uint32_t at, Extent extent) const {
+        CellSlab slab{.at = at,
+                      .code = packSlab(packSlabDirection(glm::dvec3(cell.axis)), extent.first, extent.last),
+                      .colour = meanColour(cell),
+                      .error = float(kAnySlabError),
+                      .parts = uint8_t(cell.parts)};
+        for (const uint32_t o : octants_) slab.octants = uint8_t(slab.octants | 1u << o);
+        return slab;
+    }
+
+    /// Whether a cell needs no finer leaves. Sets the slab's error.
+    bool isGood(CellSlab& slab, const CellSurface& cell, Run halves) {
+        if (normalSpread(cell) > kMostNormalSpread) return false;
+        quarters_.clear();
+        for (size_t i = halves.first; i < halves.first + halves.count; ++i) {
+            const Run run = quartersOf(i);
+            for (size_t k = run.first; k < run.first + run.count; ++k)
+                quarters_.push_back({surface_.quarters.codes[k] & 63u, &surface_.quarters.eighths[k]});
+        }
+        const double middle = f64::slabOffset(slab.code), half = f64::slabHalfThickness(slab.code);
+        const double error = slabError(f64::decodeDirection(slab.code >> kSlabDirectionShift),
+                                       {middle - half, middle + half}, quarters_);
+        if (error > kMostSlabError) return false;
+        slab.error = std::nextafter(float(error), std::numeric_limits<float>::infinity());
+        return true;
+    }
+
+    /// `halvings`: of a cell's edge, to the slab's.
+    template <class Eighth>
+    void add(CellSlab slab, std::span<const Eighth> eighths, int halvings) {
+        if (withColour_) addColourError(slab, eighths, halvings);
         slabs_.push_back(slab);
     }
 
-    void addColourError(CellSlab& slab, size_t level, Run eighths) const {
+    template <class Eighth>
+    static void addColourError(CellSlab& slab, std::span<const Eighth> eighths, int halvings) {
         const glm::dvec3 shown = okLabOfStored(slab.colour);
         double squares = 0, area = 0;
-        for (size_t i = eighths.first; i < eighths.end; ++i) {
-            const CellSurface& eighth = levels_[level + 1]->cells[i];
+        for (const Eighth& eighth : eighths) {
             if (!(eighth.area > 0)) continue;
             const double part = double(eighth.area);
             const glm::dvec3 off = okLabOf(glm::dvec3(eighth.light) / part) - shown;
@@ -72,44 +116,10 @@ private:
         // Areas are in squares of an eighth's edge.
         if (!(area > 0)) return;
         slab.colourError = float(100 * std::sqrt(squares / area));
-        slab.area = float(std::ldexp(area, -2 * int(level)));
+        slab.area = float(std::ldexp(area, -2 * halvings));
     }
 
-    /// Whether a cell needs no finer leaves. Sets the slab's error.
-    bool isGood(CellSlab& slab, size_t cell, Run halves) {
-        if (normalSpread(levels_[0]->cells[cell]) > kMostNormalSpread) return false;
-        quarters_.clear();
-        for (size_t i = halves.first; i < halves.end; ++i) {
-            const Run inside = eighthsOf(1, i);
-            for (size_t k = inside.first; k < inside.end; ++k)
-                quarters_.push_back({levels_[2]->codes[k] & 63u, &levels_[2]->cells[k]});
-        }
-        const double middle = f64::slabOffset(slab.code), half = f64::slabHalfThickness(slab.code);
-        const double error = slabError(f64::decodeDirection(slab.code >> kSlabDirectionShift),
-                                       {middle - half, middle + half}, quarters_);
-        slab.error = std::nextafter(float(error), std::numeric_limits<float>::infinity());
-        return error <= kMostSlabError;
-    }
-
-    CellSlab slabOf(size_t level, size_t index, Run eighths) {
-        const CellSurface& cell = levels_[level]->cells[index];
-        CellSlab slab{.at = levels_[level]->codes[index] << (level == 0 ? 3 : 0),
-                      .colour = meanColour(cell),
-                      .error = float(kAnySlabError),
-                      .parts = uint8_t(cell.parts),
-                      .isHalf = uint16_t(level)};
-        const uint32_t direction = packSlabDirection(glm::dvec3(cell.axis));
-        const glm::dvec3 n = f64::decodeDirection(direction);
-        octants_.clear();
-        for (size_t i = eighths.first; i < eighths.end; ++i) octants_.push_back(levels_[level + 1]->codes[i] & 7u);
-        for (const uint32_t o : octants_) slab.octants = uint8_t(slab.octants | 1u << o);
-        const auto parts = std::span(levels_[level + 1]->cells).subspan(eighths.first, octants_.size());
-        const Extent extent = extentAlong(parts, octants_, n);
-        slab.code = packSlab(direction, extent.first, extent.last);
-        return slab;
-    }
-
-    std::array<const SurfaceCells*, 3> levels_;  ///< cells, halves, quarters
+    const PageSurface& surface_;
     bool withColour_;
     std::vector<CellSlab> slabs_;
     std::vector<uint32_t> octants_;

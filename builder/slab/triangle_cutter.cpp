@@ -9,6 +9,7 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/gtc/type_precision.hpp>
+#include <glm/vector_relational.hpp>
 
 #include "builder/stream/colour_encoding.h"
 #include "octree/surface/leaf_math.h"
@@ -87,7 +88,7 @@ TriangleCutter::Source TriangleCutter::sourceOf(uint32_t triangle) const {
     Source source;
     source.parts = mesh_.kindOf(triangle);
     for (size_t i = 0; i < 3; ++i)
-        source.corners[i] = glm::dvec3(mesh_.positions[t[i]] - origin_) * (4.0 / double(kLatticePerCell));
+        source.corners[i] = glm::dvec3(mesh_.positions[t[i]] - origin_) * (2.0 / double(kLatticePerCell));
     const auto& [a, b, c] = source.corners;
     const glm::dvec3 cross = glm::cross(b - a, c - a);
     const double squared = glm::dot(cross, cross);
@@ -103,7 +104,7 @@ TriangleCutter::Source TriangleCutter::sourceOf(uint32_t triangle) const {
 }
 
 bool TriangleCutter::mayReach(uint32_t triangle) const {
-    constexpr int kSteps = kLatticePerCell / 4;  // an edge of the cutter's cells
+    constexpr int kSteps = kLatticePerCell / 2;  // an edge of the cutter's cells
     const auto& [a, b, c] = mesh_.triangles[triangle];
     const glm::i32vec3 &p = mesh_.positions[a], &q = mesh_.positions[b], &r = mesh_.positions[c];
     // The last page of the largest grid ends beyond 31 bits.
@@ -265,7 +266,87 @@ CellSurface TriangleCutter::sum(std::span<const uint64_t> pieces) const {
     return cell;
 }
 
-void TriangleCutter::appendTo(SurfaceCells& cells) const {
+namespace {
+
+/// Adds parts of a polygon to the eighths of its cell in which they are. Coordinates count from the cell's centre, in
+/// its edges.
+class EighthSums {
+public:
+    explicit EighthSums(bool withColour) : withColour_(withColour) {}
+
+    void add(std::span<const glm::vec3> corners, glm::vec4 light) {
+        glm::vec3 lower = corners[0], upper = corners[0];
+        Polygon piece;
+        for (const glm::vec3& x : corners) {
+            lower = glm::min(lower, x);
+            upper = glm::max(upper, x);
+            piece.add(glm::dvec3(x));
+        }
+        const glm::bvec3 isAbove = glm::greaterThan(lower, glm::vec3(0));
+        // Most pieces are in one octant.
+        if (glm::all(glm::notEqual(isAbove, glm::lessThan(upper, glm::vec3(0)))))
+            return addTo(int(isAbove.x) + 2 * int(isAbove.y) + 4 * int(isAbove.z), piece, light);
+        const PolygonSides x = partAt(piece, 0, 0, room_[0], room_[1]);
+        for (int i = 0; i < 2; ++i) {
+            const Polygon* byX = i == 0 ? x.below : x.above;
+            if (byX == nullptr) continue;
+            const PolygonSides y = partAt(*byX, 1, 0, room_[2], room_[3]);
+            for (int j = 0; j < 2; ++j) {
+                const Polygon* byY = j == 0 ? y.below : y.above;
+                if (byY == nullptr) continue;
+                const PolygonSides z = partAt(*byY, 2, 0, room_[4], room_[5]);
+                if (z.below != nullptr) addTo(i + 2 * j, *z.below, light);
+                if (z.above != nullptr) addTo(i + 2 * j + 4, *z.above, light);
+            }
+        }
+    }
+
+    /// Appends the eighths of cell `code` that have surface.
+    void appendTo(uint32_t code, SurfaceQuarters& quarters) {
+        for (uint32_t o = 0; o < 8; ++o) {
+            if (!hasSurface_[o]) continue;
+            EighthSurface& eighth = eighth_[o];
+            eighth.lower -= 2 * kRounding;
+            eighth.upper += 2 * kRounding;
+            quarters.codes.push_back(code << 3 | o);
+            quarters.eighths.push_back(eighth);
+        }
+    }
+
+private:
+    void addTo(int octant, const Polygon& part, glm::vec4 light) {
+        EighthSurface& eighth = eighth_[size_t(octant)];
+        hasSurface_[size_t(octant)] = true;
+        const glm::dvec3 centre = octantCentre(uint32_t(octant));
+        for (const glm::dvec3& p : part) {
+            const glm::vec3 x(2.0 * (p - centre));
+            eighth.lower = glm::min(eighth.lower, x);
+            eighth.upper = glm::max(eighth.upper, x);
+        }
+        if (!withColour_) return;
+        const auto area = float(2 * glm::length(areaVector(part)));
+        eighth.area += area;
+        eighth.light += area * light;
+    }
+
+    bool withColour_;
+    std::array<EighthSurface, 8> eighth_;
+    std::array<bool, 8> hasSurface_{};
+    std::array<Polygon, 6> room_;
+};
+
+}  // namespace
+
+void TriangleCutter::appendEighths(uint32_t code, std::span<const uint64_t> pieces, SurfaceQuarters& quarters) const {
+    EighthSums sums(!mesh_.colours.empty());
+    for (const uint64_t number : pieces) {
+        const CellPiece& piece = pieces_[uint32_t(number)];
+        sums.add(std::span(corners_).subspan(piece.first, piece.count), piece.light);
+    }
+    sums.appendTo(code, quarters);
+}
+
+void TriangleCutter::appendTo(SurfaceCells& cells, SurfaceQuarters& quarters) const {
     // Cells in order, and in each the pieces as they were cut.
     std::vector<uint64_t> order(pieces_.size());
     for (size_t i = 0; i < order.size(); ++i) order[i] = uint64_t{pieces_[i].code} << 32 | i;
@@ -275,7 +356,9 @@ void TriangleCutter::appendTo(SurfaceCells& cells) const {
         size_t end = i;
         while (end < order.size() && uint32_t(order[end] >> 32) == code) ++end;
         cells.codes.push_back(code);
-        cells.cells.push_back(sum(std::span(order).subspan(i, end - i)));
+        const auto pieces = std::span(order).subspan(i, end - i);
+        cells.cells.push_back(sum(pieces));
+        appendEighths(code, pieces, quarters);
         i = end;
     }
 }

@@ -26,15 +26,16 @@ struct CutterBox {
 class TriangleCutter {
 public:
     /// `origin`: the page's lowest corner on the lattice; the page has 2^depth of the cutter's cells an edge, of which
-    /// four are as long as one cell of the mesh's level. `within`: the box of the page that pieces are kept of.
+    /// two are as long as one cell of the mesh's level. `within`: the box of the page that pieces are kept of.
     TriangleCutter(const LatticeMesh& mesh, glm::i32vec3 origin, int depth, CutterBox within)
         : mesh_(mesh), origin_(origin), depth_(depth), within_(within) {}
 
     /// Cuts a triangle of the mesh; what lies outside of the box is left out. A piece in a wall belongs to both sides.
     void cut(uint32_t triangle);
     [[nodiscard]] size_t pieces() const { return pieces_.size(); }
-    /// Appends what is known of the box's cells, in Morton order. To be called once, after all cuts.
-    void appendTo(SurfaceCells& cells) const;
+    /// Appends what is known of the box's cells and of their eighths, in Morton order. To be called once, after all
+    /// cuts.
+    void appendTo(SurfaceCells& cells, SurfaceQuarters& quarters) const;
 
 private:
     /// The triangle that is being cut, in the cutter's cells from the page's lowest corner, and what is blended over
@@ -87,6 +88,7 @@ private:
     [[nodiscard]] glm::vec4 lightOf(const Polygon& piece) const;
     /// `pieces`: their numbers in the low halves of words.
     [[nodiscard]] CellSurface sum(std::span<const uint64_t> pieces) const;
+    void appendEighths(uint32_t code, std::span<const uint64_t> pieces, SurfaceQuarters& quarters) const;
 
     static constexpr int kMostWalls = 6;
     static constexpr size_t kMostParts = 27;  // with two walls along each axis
