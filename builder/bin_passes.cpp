@@ -79,7 +79,7 @@ Result<void> buildBinPages(const LevelPlan& plan, LatticeMesh& mesh, const BinPa
 
 FileHeader headerOf(const LevelPlan& plan, const SoupMeasures& measures, bool hasColour, const PartCounts& parts) {
     FileHeader header = headerOf(measures, plan.frame, plan.errorTarget, hasColour);
-    if (plan.hasSlabs) header.flags |= kFlagCovering;
+    if (plan.hasSlabs) header.flags |= kFlagCovering | kFlagFineSlabs;
     header.flags |= kFlagParts;
     header.parts = parts.parts;
     header.closedParts = parts.closed;

@@ -1,7 +1,6 @@
 #include "builder/slab_pages.h"
 
 #include <string>
-#include <utility>
 
 #include "builder/ordered_pages.h"
 #include "builder/page/page_encoder.h"
@@ -45,7 +44,8 @@ Result<BuiltPage> buildPage(const LevelSettings& settings, const PageSpool& belo
                             bool withSurface) {
     VCP_TRY_ASSIGN(auto fold, foldBelow(below, siblings, settings.grid.log2Cells));
     StoredPage surface;
-    if (withSurface) surface = surfaceToHandUp(settings, foldSurface(std::exchange(fold.quarters, {})));
+    if (withSurface) surface = surfaceToHandUp(settings, foldSurface(fold.quarters, settings.withColour));
+    fold.quarters = {};
     PageTree tree = slabTree(fold.slabs, settings.grid.log2Cells);
     const uint64_t code = below.entries()[siblings.first].morton >> 3;
     VCP_TRY_ASSIGN(auto page, builtPage(settings, code, encodeSlabPage(tree, settings.withColour)));

@@ -9,6 +9,8 @@
 #include <cstdint>
 #include <span>
 
+#include <glm/common.hpp>
+#include <glm/gtc/type_precision.hpp>
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
 
@@ -25,12 +27,15 @@ struct CellSurface {
     uint32_t parts = 0;             ///< kinds of parts that it belongs to, as PageEntry's
 };
 
-/// What is known of the surface in an eighth of a cell that is cut no finer; as in CellSurface. Area and light are 0 in
-/// meshes without colour.
-struct EighthSurface {
-    glm::vec3 lower{1}, upper{-1};
-    float area = 0;
-    glm::vec4 light{0};
+/// A box that holds the surface in an eighth of a cell, in 1/255 of the eighth's edge from its lowest corner.
+struct EighthBox {
+    glm::u8vec3 lower{255}, upper{0};
+
+    EighthBox() = default;
+    /// Rounds a box outwards; coordinates as in CellSurface.
+    EighthBox(glm::vec3 least, glm::vec3 most)
+        : lower(glm::clamp(glm::floor((least + 0.5f) * 255.0f), 0.0f, 255.0f)),
+          upper(glm::clamp(glm::ceil((most + 0.5f) * 255.0f), 0.0f, 255.0f)) {}
 };
 
 /// The values between which something lies.
@@ -57,6 +62,9 @@ void chooseAxis(CellSurface& cell);
 
 /// Returns how far the normals are from the axis: the mean of their squared sines, 0 to 2/3.
 double normalSpread(const CellSurface& cell);
+
+/// Returns the sum of area * linear RGB, and the area.
+inline glm::vec4 litArea(const CellSurface& cell) { return {cell.light.x, cell.light.y, cell.light.z, cell.area}; }
 
 /// Returns the mean light as a stored colour; white where the surface has no area.
 uint32_t meanColour(const CellSurface& cell);

@@ -107,13 +107,17 @@ uint64_t halvesTouched(const LatticeMesh& mesh, std::span<const uint32_t> triang
     return halves;
 }
 
-PageSurface foldSurface(const SurfaceCells& quarters) {
+PageSurface foldSurface(const SurfaceCells& quarters, bool withColour) {
     PageSurface surface;
     surface.halves = foldCells(quarters);
     surface.cells = foldCells(surface.halves);
     surface.quarters.codes = quarters.codes;
-    surface.quarters.eighths.reserve(quarters.size());
-    for (const CellSurface& c : quarters.cells) surface.quarters.eighths.push_back({c.lower, c.upper, c.area, c.light});
+    surface.quarters.boxes.reserve(quarters.size());
+    if (withColour) surface.quarters.lights.reserve(quarters.size());
+    for (const CellSurface& c : quarters.cells) {
+        surface.quarters.boxes.emplace_back(c.lower, c.upper);
+        if (withColour) surface.quarters.lights.push_back(litArea(c));
+    }
     return surface;
 }
 

@@ -20,10 +20,11 @@ struct SurfaceCells {
     [[nodiscard]] size_t size() const { return codes.size(); }
 };
 
-/// The eighths of halves of cells that have surface.
+/// The quarters of cells that have surface.
 struct SurfaceQuarters {
     std::vector<uint32_t> codes;  ///< Morton codes within the page, ascending
-    std::vector<EighthSurface> eighths;
+    std::vector<EighthBox> boxes;
+    std::vector<glm::vec4> lights;  ///< sums of area * linear RGB, and area; empty where the mesh has no colour
 
     [[nodiscard]] size_t size() const { return codes.size(); }
 };
@@ -44,7 +45,7 @@ PageSurface surfaceOf(const LatticeMesh& mesh, std::span<const uint32_t> triangl
                       uint32_t log2Cells, size_t mostPieces = kMostPieces);
 
 /// Returns the surface in a page, from what is known of it in the quarters of its cells.
-PageSurface foldSurface(const SurfaceCells& quarters);
+PageSurface foldSurface(const SurfaceCells& quarters, bool withColour);
 
 /// Returns the coarser cells that hold these.
 SurfaceCells foldCells(const SurfaceCells& eighths);
@@ -55,8 +56,8 @@ SurfaceCells foldCells(const SurfaceCells& eighths);
 constexpr uint64_t surfaceWorkBytes(uint64_t triangles, double area, double perimeter, uint64_t halves = 1 << 18,
                                     size_t mostPieces = kMostPieces) {
     const double pieces = 7 * area + 3 * perimeter + 2 * double(triangles);
-    if (pieces < double(mostPieces)) return uint64_t(400 * pieces);
-    return 160 * mostPieces + 500 * halves + 160 * triangles;
+    if (pieces < double(mostPieces)) return uint64_t(240 * pieces);
+    return 160 * mostPieces + 320 * halves + 160 * triangles;
 }
 
 /// Returns how many half cells of a page the boxes around triangles touch. Precondition: log2Cells < 6.

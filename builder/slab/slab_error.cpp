@@ -25,11 +25,11 @@ struct Box {
 class QuarterBoxes {
 public:
     explicit QuarterBoxes(std::span<const SurfaceQuarter> quarters) {
-        for (const auto& [code, surface] : quarters) {
+        for (const auto& [code, box] : quarters) {
             const glm::ivec3 at(mortonDecode(code));
-            const glm::dvec3 centre = (glm::dvec3(at) + 0.5) / double(kSide) - 0.5;
-            box_[indexOf(at)] = {centre + glm::dvec3(surface->lower) / double(kSide),
-                                 centre + glm::dvec3(surface->upper) / double(kSide)};
+            const glm::dvec3 lowest = glm::dvec3(at) / double(kSide) - 0.5;
+            box_[indexOf(at)] = {lowest + glm::dvec3(box.lower) / (255.0 * kSide),
+                                 lowest + glm::dvec3(box.upper) / (255.0 * kSide)};
             isFull_[indexOf(at)] = true;
             octants_ |= octantOf(at);
         }

@@ -47,7 +47,11 @@ private:
         takeOctants(surface_.halves.codes, run);
         const glm::dvec3 n = f64::decodeDirection(packSlabDirection(glm::dvec3(cell.axis)));
         CellSlab slab = slabOf(cell, code << 3, extentAlong(halves, octants_, n));
-        if (isGood(slab, cell, run)) return add(slab, halves, 0);
+        if (isGood(slab, cell, run)) {
+            lights_.clear();
+            for (const CellSurface& half : halves) lights_.push_back(litArea(half));
+            return add(slab, lights_, 0);
+        }
         // Halves of cells are never parted: their error is small enough whatever lies in them.
         for (size_t i = run.first; i < run.first + run.count; ++i) addHalf(i);
     }
@@ -59,7 +63,8 @@ private:
         const glm::dvec3 n = f64::decodeDirection(packSlabDirection(glm::dvec3(half.axis)));
         CellSlab slab = slabOf(half, surface_.halves.codes[i], extentAlong(half, n));
         slab.isHalf = 1;
-        add(slab, std::span(surface_.quarters.eighths).subspan(run.first, run.count), 1);
+        const std::span<const glm::vec4> lights(surface_.quarters.lights);
+        add(slab, lights.empty() ? lights : lights.subspan(run.first, run.count), 1);
     }
 
     void takeOctants(const std::vector<uint32_t>& codes, Run run) {
@@ -85,7 +90,7 @@ private:
         for (size_t i = halves.first; i < halves.first + halves.count; ++i) {
             const Run run = quartersOf(i);
             for (size_t k = run.first; k < run.first + run.count; ++k)
-                quarters_.push_back({surface_.quarters.codes[k] & 63u, &surface_.quarters.eighths[k]});
+                quarters_.push_back({surface_.quarters.codes[k] & 63u, surface_.quarters.boxes[k]});
         }
         const double middle = f64::slabOffset(slab.code), half = f64::slabHalfThickness(slab.code);
         const double error = slabError(f64::decodeDirection(slab.code >> kSlabDirectionShift),
@@ -95,21 +100,19 @@ private:
         return true;
     }
 
-    /// `halvings`: of a cell's edge, to the slab's.
-    template <class Eighth>
-    void add(CellSlab slab, std::span<const Eighth> eighths, int halvings) {
-        if (withColour_) addColourError(slab, eighths, halvings);
+    /// `lights`: of its eighths. `halvings`: of a cell's edge, to the slab's.
+    void add(CellSlab slab, std::span<const glm::vec4> lights, int halvings) {
+        if (withColour_) addColourError(slab, lights, halvings);
         slabs_.push_back(slab);
     }
 
-    template <class Eighth>
-    static void addColourError(CellSlab& slab, std::span<const Eighth> eighths, int halvings) {
+    static void addColourError(CellSlab& slab, std::span<const glm::vec4> lights, int halvings) {
         const glm::dvec3 shown = okLabOfStored(slab.colour);
         double squares = 0, area = 0;
-        for (const Eighth& eighth : eighths) {
-            if (!(eighth.area > 0)) continue;
-            const double part = double(eighth.area);
-            const glm::dvec3 off = okLabOf(glm::dvec3(eighth.light) / part) - shown;
+        for (const glm::vec4& light : lights) {
+            if (!(light.w > 0)) continue;
+            const double part = double(light.w);
+            const glm::dvec3 off = okLabOf(glm::dvec3(light) / part) - shown;
             squares += part * glm::dot(off, off);
             area += part;
         }
@@ -122,8 +125,10 @@ private:
     const PageSurface& surface_;
     bool withColour_;
     std::vector<CellSlab> slabs_;
+    // Of the slab at hand.
     std::vector<uint32_t> octants_;
     std::vector<SurfaceQuarter> quarters_;
+    std::vector<glm::vec4> lights_;
 };
 
 class SlabTreeBuilder {

@@ -57,11 +57,20 @@ glm::dvec4 lightOfColour(const glm::dvec4& stored) {
     return {lightOfStored(stored.r), lightOfStored(stored.g), lightOfStored(stored.b), stored.a};
 }
 
+/// Returns the mean light of a triangle over which stored colours are blended, by the six points of Dunavant's rule of
+/// degree 4 (High degree efficient symmetrical Gaussian quadrature rules for the triangle, 1985, table II).
+glm::dvec4 meanLight(const glm::dvec4& a, const glm::dvec4& b, const glm::dvec4& c) {
+    const auto three = [&](double apart) {
+        const glm::dvec4 rest = apart * (a + b + c);
+        const double own = 1 - 3 * apart;
+        return lightOfColour(rest + own * a) + lightOfColour(rest + own * b) + lightOfColour(rest + own * c);
+    };
+    return 0.109951743655322 * three(0.091576213509771) + 0.223381589678011 * three(0.445948490915965);
+}
+
 }  // namespace
 
-// Pictures blend stored colours over a triangle and take their light. A fan is summed up by the middles of its
-// triangles' edges, which is exact for quadratics: of light that goes from black to white within a piece, it errs by a
-// few hundredths.
+// Pictures blend stored colours over a triangle and take their light, whose mean a fan of triangles sums up.
 glm::vec4 TriangleCutter::lightOf(const Polygon& piece) const {
     if (mesh_.colours.empty()) return glm::vec4(1);
     if (source_.isPlain) return glm::vec4(lightOfColour(source_.colour[0]));
@@ -75,12 +84,11 @@ glm::vec4 TriangleCutter::lightOf(const Polygon& piece) const {
     for (size_t i = 2; i < piece.size(); ++i) {
         const glm::dvec4 after = storedAt(piece[i]);
         const double share = glm::length(glm::cross(piece[i - 1] - piece[0], piece[i] - piece[0]));
-        sum += share * (lightOfColour((first + before) / 2.0) + lightOfColour((before + after) / 2.0) +
-                        lightOfColour((after + first) / 2.0));
+        sum += share * meanLight(first, before, after);
         area += share;
         before = after;
     }
-    return glm::vec4(sum / (3 * area));
+    return glm::vec4(sum / area);
 }
 
 TriangleCutter::Source TriangleCutter::sourceOf(uint32_t triangle) const {
@@ -304,34 +312,36 @@ public:
     /// Appends the eighths of cell `code` that have surface.
     void appendTo(uint32_t code, SurfaceQuarters& quarters) {
         for (uint32_t o = 0; o < 8; ++o) {
-            if (!hasSurface_[o]) continue;
-            EighthSurface& eighth = eighth_[o];
-            eighth.lower -= 2 * kRounding;
-            eighth.upper += 2 * kRounding;
+            if (lower_[o].x > upper_[o].x) continue;
             quarters.codes.push_back(code << 3 | o);
-            quarters.eighths.push_back(eighth);
+            quarters.boxes.emplace_back(lower_[o] - 2 * kRounding, upper_[o] + 2 * kRounding);
+            if (withColour_) quarters.lights.push_back(light_[o]);
         }
     }
 
 private:
+    static std::array<glm::vec3, 8> filled(float value) {
+        std::array<glm::vec3, 8> all;
+        all.fill(glm::vec3(value));
+        return all;
+    }
+
     void addTo(int octant, const Polygon& part, glm::vec4 light) {
-        EighthSurface& eighth = eighth_[size_t(octant)];
-        hasSurface_[size_t(octant)] = true;
+        const auto o = size_t(octant);
         const glm::dvec3 centre = octantCentre(uint32_t(octant));
         for (const glm::dvec3& p : part) {
             const glm::vec3 x(2.0 * (p - centre));
-            eighth.lower = glm::min(eighth.lower, x);
-            eighth.upper = glm::max(eighth.upper, x);
+            lower_[o] = glm::min(lower_[o], x);
+            upper_[o] = glm::max(upper_[o], x);
         }
         if (!withColour_) return;
         const auto area = float(2 * glm::length(areaVector(part)));
-        eighth.area += area;
-        eighth.light += area * light;
+        light_[o] += area * glm::vec4(glm::vec3(light), 1);
     }
 
     bool withColour_;
-    std::array<EighthSurface, 8> eighth_;
-    std::array<bool, 8> hasSurface_{};
+    std::array<glm::vec3, 8> lower_ = filled(1), upper_ = filled(-1);
+    std::array<glm::vec4, 8> light_{};  // sums of area * linear RGB, and area
     std::array<Polygon, 6> room_;
 };
 

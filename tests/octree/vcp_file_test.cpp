@@ -360,7 +360,7 @@ TEST_F(VcpFile, WrongMagicAndVersion) {
     EXPECT_EQ(past.error().code, ErrorCode::Unsupported);
     EXPECT_EQ(
         past.error().line(),
-        "memory.vcp: header: byte 8: file version 2 is not known; this program reads versions 3 to 10: build it again");
+        "memory.vcp: header: byte 8: file version 2 is not known; this program reads versions 3 to 11: build it again");
 }
 
 TEST_F(VcpFile, HeaderLiesAreFound) {
