@@ -12,6 +12,7 @@
 #include "mesostructure/base/surface_edges.h"
 #include "mesostructure/remesh/remesher.h"
 #include "mesostructure/solids.h"
+#include "viewer/asset/share_out.h"
 #include "viewer/scene/base_light.h"
 #include "viewer/scene/base_mesh.h"
 #include "viewer/scene/mesh_cache.h"
@@ -24,6 +25,8 @@ using namespace meso;
 namespace {
 
 constexpr int kTexels = 256;
+// Levels of larger maps are averages: least volumes would take minutes.
+constexpr size_t kMostFittedTexels = size_t{1} << 20;
 
 Result<std::shared_ptr<const MarchArrays>> arraysOf(const Asset& asset, const MethodOptions& options) {
     VCP_TRY_ASSIGN(const auto shape, shapeOf(asset));
@@ -81,7 +84,8 @@ private:
 /// Makes remeshed surfaces; the levels of a height field are made once.
 class Remeshing {
 public:
-    Result<MesoSurface> make(const MesoSurfaceDescription& d, const Asset& asset, const BaseSurface& base) {
+    /// Takes the asset's heights.
+    Result<MesoSurface> make(const MesoSurfaceDescription& d, Asset& asset, const BaseSurface& base) {
         if (!asset.heights)
             return Error{.code = ErrorCode::Usage,
                          .message = fmt::format("{} is for height fields; {} is a solid", kRemeshMethod, asset.name)};
@@ -94,12 +98,13 @@ public:
                          .message = fmt::format("{} takes no normal texture: leave it out, or take another method",
                                                 kRemeshMethod)};
         // Certified cells take heights from the map, and of coarser levels normals alone.
-        const LevelFit fit = d.errorPixels > 0 ? LevelFit::Averaged : LevelFit::Least;
+        const bool isLarge = asset.heights->texels.size() > kMostFittedTexels;
+        const LevelFit fit = d.errorPixels > 0 || isLarge ? LevelFit::Averaged : LevelFit::Least;
         auto& levels = levels_[{d.asset, d.withFilter, fit}];
         if (!levels) {
             LevelFitOptions options{.fit = fit};
             if (!d.withFilter) options.mostLevels = 1;
-            VCP_TRY_ASSIGN(auto made, HeightLevels::build(*asset.heights, options));
+            VCP_TRY_ASSIGN(auto made, HeightLevels::build(std::move(*asset.heights), options));
             levels = std::make_shared<const HeightLevels>(std::move(made));
         }
         auto made =
@@ -111,7 +116,11 @@ public:
         }
         MesoSurface surface;
         surface.remeshed = {std::make_shared<const RemeshSurface>(*std::move(made)),
-                            {.cell = d.cell, .errorPixels = d.errorPixels}};
+                            {.cell = d.cell,
+                             .errorPixels = d.errorPixels,
+                             .shareOut = [](size_t count, const std::function<void(size_t first, size_t last)>& fill) {
+                                 return shareOut(count, fill, {});
+                             }}};
         return surface;
     }
 
@@ -262,7 +271,7 @@ Result<MesoScene> makeMesoScene(std::span<const MesoSurfaceDescription> descript
     for (const MesoSurfaceDescription& d : descriptions) {
         SurfacePath& path = scene.paths.emplace_back(d.path);
         for (glm::dvec3& point : path.points) point -= d.place;
-        const auto asset = openMesoAsset(d.asset);
+        auto asset = openMesoAsset(d.asset);
         if (!asset) return d.from.blamed(asset.error());
         const auto base = baseOf(d);
         if (!base) return d.from.blamed(base.error());

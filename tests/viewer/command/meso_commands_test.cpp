@@ -82,6 +82,38 @@ TEST_F(MesoCommands, BuildsAndTellsWhatIsInIt) {
     EXPECT_EQ(Json::parse(run("meso info " + path("a.meso") + " --json").out)["texels"], Json::array({16, 8}));
 }
 
+TEST_F(MesoCommands, LargeMapsAreHeightsAlone) {
+    const std::string build = "meso build needle --texels 4104 -o " + path("large.meso");
+    const Ran refused = run(build);
+    EXPECT_EQ(refused.status, 1);
+    EXPECT_NE(refused.err.find("4104 x 4104 texels: rays are marched over at most 4096"), std::string::npos)
+        << refused.err;
+    EXPECT_NE(refused.err.find("--only-heights"), std::string::npos) << refused.err;
+    EXPECT_FALSE(std::filesystem::exists(path("large.meso")));
+    EXPECT_EQ(run("meso build beads --only-heights -o " + path("none.meso")).status, 2);
+    const Ran built = run(build + " --only-heights --json");
+    ASSERT_EQ(built.status, 0) << built.err;
+    const Json told = Json::parse(built.out);
+    EXPECT_EQ(told["texels"], Json::array({4104, 4104}));
+    EXPECT_TRUE(told["grid"].is_null());
+    EXPECT_LT(told["file_bytes"], 2 * 4104 * 4104 + 1000);
+    const auto draw = [&](const std::string& rest) {
+        std::ofstream(path("scene.json"))
+            << R"({"mesostructure": [{"asset": "large.meso", "tiles": 1, "method": )" << rest << "}]}";
+        return run("render " + path("scene.json") + " --size 64x48 --samples 1 --json -o " + path("large.png") +
+                   " --overwrite");
+    };
+    const Ran drawn = draw(R"("remesh")");
+    ASSERT_EQ(drawn.status, 0) << drawn.err;
+    const Json figures = Json::parse(drawn.out);
+    EXPECT_GT(figures["remeshed_pixels"], 0);
+    EXPECT_LE(figures["remeshed_pixels"], 0.5);
+    EXPECT_GT(figures["surface_bytes"], 2 * 4104 * 4104);
+    const Ran marched = draw(R"("boxes")");
+    EXPECT_EQ(marched.status, 1);
+    EXPECT_NE(marched.err.find("at most 4096"), std::string::npos) << marched.err;
+}
+
 TEST_F(MesoCommands, MeshesMustBeClosed) {
     // A tetrahedron, and the same without a face.
     const std::string corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n", faces = "f 1 3 2\nf 1 2 4\nf 2 3 4\n";
