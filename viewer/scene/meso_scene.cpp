@@ -151,18 +151,22 @@ public:
         bases_.back().isAsked = isAsking(d);
         return {};
     }
-    /// Gives its transfer to each surface that asks for it.
-    void trace(std::span<const MesoSurfaceDescription> descriptions, MesoScene& scene) const {
-        if (bases_.empty()) return;
+    /// Gives its transfer to each surface that asks for it. Errors: Cancelled.
+    Result<void> trace(std::span<const MesoSurfaceDescription> descriptions, MesoScene& scene,
+                       const SurfaceProgress& progress) const {
+        if (bases_.empty()) return {};
         const auto cache = defaultCacheFolder();
-        const auto traced = traceBases(bases_, cache ? *cache : std::filesystem::path());
+        const auto traced = traceBases(bases_, cache ? *cache : std::filesystem::path(),
+                                       [&](double part) { return !progress || progress("light of bases", part); });
         if (!traced) {
+            if (traced.error().code == ErrorCode::Cancelled) return traced.error();
             scene.warnings.push_back(traced.error().message + "; the bases do not shade each other");
-            return;
+            return {};
         }
         size_t next = 0;
         for (size_t i = 0; i < descriptions.size(); ++i)
             if (descriptions[i].path.points.empty()) scene.surfaces[i].baseTransfer = (*traced)[next++];
+        return {};
     }
 
 private:
@@ -186,8 +190,9 @@ void warn(const MesoSurfaceDescription& d, const BaseSurface& base, const Shell&
     say(shell.withoutArea, "triangles without area are left out");
     say(shell.withoutMap, "triangles whose texture coordinates have no area: the mesostructure is smeared there");
     say(shell.flat, "pieces of the shell have no volume and are left out: faces on their own backs have no outside");
-    say(shell.inverted,
-        "pieces of the shell are turned inside out: the surface bends more sharply than the mesostructure is high");
+    say(shell.cut,
+        "columns of the shell are cut: the surface bends more sharply inwards than the mesostructure is high");
+    say(shell.inverted, "pieces of the shell are turned inside out: the surface folds there");
 }
 
 }  // namespace
@@ -252,7 +257,7 @@ Result<Asset> openMesoAsset(const std::string& name) {
     return asset;
 }
 
-Result<MesoScene> makeMesoScene(std::span<const MesoSurfaceDescription> descriptions) {
+Result<MesoScene> makeMesoScene(std::span<const MesoSurfaceDescription> descriptions, const SurfaceProgress& progress) {
     MesoScene scene;
     Textures textures;
     Remeshing remeshing;
@@ -260,6 +265,8 @@ Result<MesoScene> makeMesoScene(std::span<const MesoSurfaceDescription> descript
     std::map<std::string, Transfer> transfers;  // an asset is read once for each surface, and kept once
     SceneBases bases(descriptions);
     for (const MesoSurfaceDescription& d : descriptions) {
+        const double part = double(scene.paths.size()) / double(descriptions.size());
+        if (progress && !progress("mesostructure", part)) return Error::cancelled();
         SurfacePath& path = scene.paths.emplace_back(d.path);
         for (glm::dvec3& point : path.points) point -= d.place;
         const auto asset = openMesoAsset(d.asset);
@@ -314,7 +321,7 @@ Result<MesoScene> makeMesoScene(std::span<const MesoSurfaceDescription> descript
         surface.withBase = d.withBase;
         scene.surfaces.push_back(std::move(surface));
     }
-    bases.trace(descriptions, scene);
+    VCP_TRY(bases.trace(descriptions, scene, progress));
     return scene;
 }
 
