@@ -293,6 +293,11 @@ RunCommand addBenchMeso(CLI::App& bench) {
     app->add_flag(
         "--light", options.light,
         "Also compare light from everywhere on a tile, and on two bases, in the three skies, with a path tracer");
+    app->add_flag("--prisms", options.prisms,
+                  "Also measure what maps from prisms to the tile distort: one line, tetrahedra, the curved path");
+    app->add_flag("--models", options.models,
+                  "Also time frames of six models that the paper prints rates of, a covered pixel and a prism, by the "
+                  "host or on the device");
     app->add_flag("--published", options.published,
                   "Beside the ratios of the paper's tables (with --sweep, for those of times)");
     app->add_option("--remesh", command->remesh,
