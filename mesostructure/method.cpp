@@ -172,8 +172,10 @@ bool methodFits(std::string_view name, const Asset& asset) {
 }
 
 GdmOptions tracedBy(const Shape& shape, const MethodOptions& options) {
-    return {
-        .points = pointsOf(shape.extent(), options), .directions = options.directions, .ofTop = options.name == "vdm"};
+    GdmOptions traced;
+    traced.points = pointsOf(shape.extent(), options), traced.directions = options.directions;
+    traced.ofTop = options.name == "vdm", traced.shareOut = options.shareOut;
+    return traced;
 }
 
 Result<Method> buildMethod(const Asset& asset, const Shape& shape, const MethodOptions& options) {

@@ -2,6 +2,7 @@
 // shaders are made from the same arrays (march_arrays.h).
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <span>
 #include <string>
@@ -54,9 +55,11 @@ struct MethodOptions {
     glm::ivec2 directions{16, 32};         ///< theirs: elevations over the sphere (vdm: over its lower half), azimuths
     int layers = 0;                        ///< points along z of a map or of slices; 0: as far apart as along x
     const DistanceTable* table = nullptr;  ///< traced already by tracedBy of these options; null: it is traced
-    SafeOptions guesses = {};              ///< of gdm-safe
-    int mostGuesses = 1;                   ///< of a ray of gdm-safe
-    double cap = 0;                        ///< longest distance of dm and of all ddm, tiles; 0: 1/4, or 1/8
+    /// As GdmOptions::shareOut, of that tracing.
+    std::function<bool(size_t count, const std::function<void(size_t first, size_t last)>& fill)> shareOut = {};
+    SafeOptions guesses = {};                         ///< of gdm-safe
+    int mostGuesses = 1;                              ///< of a ray of gdm-safe
+    double cap = 0;                                   ///< longest distance of dm and of all ddm, tiles; 0: 1/4, or 1/8
     DistanceRule distances = DistanceRule::AnyPoint;  ///< of dm and of all ddm
 };
 

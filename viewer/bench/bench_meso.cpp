@@ -330,7 +330,8 @@ bool isAsked(const std::vector<std::string>& asked, std::string_view name) {
 Result<std::vector<BenchMesoRow>> rowsOf(Subject& subject, const BenchMesoOptions& options, MesoMarcher* renderer,
                                          const std::function<bool(const std::string&)>& told) {
     const auto isMeasured = [&](const Entry& e) {
-        return isAsked(options.methods, e.options.name) && (options.sweep || e.isDefault) &&
+        return isAsked(options.methods, e.options.name) &&
+               (options.sweep || e.isDefault || (options.published && isOfPublished(e.options.name, e.knob))) &&
                methodFits(e.options.name, subject.asset);
     };
     // The peer is measured with them, requested or not.

@@ -31,7 +31,7 @@ struct BenchMesoOptions {
     bool sweep = false;                 ///< each method at several values of its knob
     int rays = 2000;                    ///< a view
     int repetitions = 3;                ///< rounds over the methods
-    bool published = false;             ///< compares with the paper's tables; its Table 3 is made anew
+    bool published = false;             ///< compares with the papers' tables, each method at the knobs that these need
     bool factors = false;               ///< compares the factors of displacement maps
     bool light = false;                 ///< compares light from everywhere on a tile with a path tracer
     bool prisms = false;                ///< measures what maps from prisms to tile space distort
@@ -233,7 +233,9 @@ MesoJudged judgeMeso(const std::vector<meso::MarchResult>& results, const std::v
 /// Writes the mean work, its bins and divergence into the row.
 void countWork(const std::vector<meso::MarchResult>& results, BenchMesoRow& row);
 
-/// Compares with Tables 1 and 2 and the secant's claim, as far as the rows allow.
+/// Whether a method at that knob is in a ratio that publishedOf compares.
+bool isOfPublished(std::string_view method, std::string_view knob);
+/// Compares with the printed ratios of single methods, as far as the rows allow.
 std::vector<MesoPublished> publishedOf(const std::vector<BenchMesoRow>& rows);
 
 /// Returns the methods with a knob that qualifies, by asset in the order of the rows.

@@ -3,11 +3,13 @@
 #include <array>
 #include <cmath>
 #include <ctime>
+#include <map>
 
 #include <fmt/format.h>
 #include <glm/geometric.hpp>
 
 #include "builder/measure/quantile.h"
+#include "mesostructure/method.h"
 #include "mesostructure/transfer_volume.h"
 #include "render/environment_light.h"
 #include "render/picture_renderer.h"
@@ -91,21 +93,53 @@ Result<Transferred> transferred(const Model& model, const Progress& progress) {
     return Transferred{std::make_shared<const TransferVolume>(std::move(volume)), traced[0]};
 }
 
-Result<Drawn> drawnBy(MesoSurfaceDescription described, const Transferred* light, const std::string& device) {
-    described.withFar = false;
-    VCP_TRY_ASSIGN(auto scene, makeMesoScene(std::span(&described, 1)));
-    VCP_TRY_ASSIGN(const auto base, makeBaseSurface(described.base, described.tiles));
+/// What methods read of assets, made once for all bases and lights.
+class AllArrays {
+public:
+    Result<std::shared_ptr<const MarchArrays>> of(const std::string& name, const Asset& asset, MethodOptions method,
+                                                  const Progress& progress) {
+        auto& made = made_[{name, method.name}];
+        if (made) return made;
+        VCP_TRY_ASSIGN(const auto shape, shapeOf(asset));
+        method.shareOut = [&](size_t count, const std::function<void(size_t, size_t)>& fill) {
+            return shareOut(count, fill,
+                            [&](double part) { return !progress || progress("distances of " + name, part); });
+        };
+        VCP_TRY_ASSIGN(const auto built, buildMethod(asset, *shape, method));
+        VCP_TRY_ASSIGN(auto arrays, built.arrays());
+        return made = std::make_shared<const MarchArrays>(std::move(arrays));
+    }
+
+private:
+    std::map<std::pair<std::string, std::string>, std::shared_ptr<const MarchArrays>> made_;
+};
+
+/// What is drawn: an asset on a base by a method.
+struct Subject {
+    std::string asset, base;
+    double tiles = 4;
+    MethodOptions method;
+};
+
+Result<Drawn> drawnBy(const Subject& subject, const Transferred* light, const std::string& device, AllArrays& arrays,
+                      const Progress& progress) {
+    VCP_TRY_ASSIGN(const auto asset, openMesoAsset(subject.asset));
+    VCP_TRY_ASSIGN(const auto base, makeBaseSurface(subject.base, subject.tiles));
+    MesoSurface surface;
+    VCP_TRY_ASSIGN(surface.arrays, arrays.of(subject.asset, asset, subject.method, progress));
+    VCP_TRY_ASSIGN(surface.shell, buildShell(base, tileEdge(base) * asset.extent.z, asset.extent));
+    surface.lift = shadowLift(*surface.arrays, tileEdge(base));
     Drawn drawn{.model = nullptr, .row = {}, .renderer = nullptr, .request = {}, .ns = {}};
     MesoModel& row = drawn.row;
-    row.asset = described.asset, row.base = described.base, row.method = described.method.name;
+    row.asset = subject.asset, row.base = subject.base, row.method = subject.method.name;
     row.light = light != nullptr ? "everywhere" : "local";
     row.prisms = base.triangles.size();
     FrameRequest& request = drawn.request;
     request.width = kAcross, request.height = kDown;
-    request.camera = fitCamera(scene.bounds.low, scene.bounds.high, glm::normalize(glm::dvec3(-0.5, 0.7, -0.4)),
+    request.camera = fitCamera(surface.shell.low, surface.shell.high, glm::normalize(glm::dvec3(-0.5, 0.7, -0.4)),
                                {0, 0, 1}, 0.6, double(kAcross) / kDown);
     if (light != nullptr) {
-        scene.surfaces[0].transfer = light->volume, scene.surfaces[0].baseTransfer = light->base;
+        surface.transfer = light->volume, surface.baseTransfer = light->base;
         request.shading.environment = environmentNamed(kSky);
         request.shading.environment->up = {0, 0, 1};
     } else {
@@ -116,7 +150,7 @@ Result<Drawn> drawnBy(MesoSurfaceDescription described, const Transferred* light
     RendererOptions options;
     options.device = device;
     VCP_TRY_ASSIGN(drawn.renderer, createPictureRenderer(options));
-    VCP_TRY(drawn.renderer->setSurfaces(scene.surfaces));
+    VCP_TRY(drawn.renderer->setSurfaces(std::span(&surface, 1)));
     return drawn;
 }
 
@@ -194,6 +228,7 @@ void compareRates(const std::vector<Drawn>& all, std::vector<MesoPublished>& pub
 Result<std::vector<MesoModel>> compareMesoModels(const std::string& device, int repetitions,
                                                  std::vector<MesoPublished>& published, const Progress& progress) {
     std::vector<Drawn> all;
+    AllArrays arrays;
     for (size_t i = 0; i < kModels.size(); ++i) {
         const Model& model = kModels[i];
         const double part = double(i) / kModels.size();
@@ -206,19 +241,18 @@ Result<std::vector<MesoModel>> compareMesoModels(const std::string& device, int 
             for (const Transferred* in :
                  {static_cast<const Transferred*>(nullptr), static_cast<const Transferred*>(&light)}) {
                 if (in != nullptr && !light.volume) continue;
-                MesoSurfaceDescription described;
-                described.asset = model.asset, described.base = model.base, described.tiles = model.tiles;
-                described.method.name = method;
-                VCP_TRY_ASSIGN(auto drawn, drawnBy(described, in, device));
+                MethodOptions options;
+                options.name = method;
+                VCP_TRY_ASSIGN(auto drawn,
+                               drawnBy({model.asset, model.base, model.tiles, options}, in, device, arrays, progress));
                 drawn.model = &model;
                 all.push_back(std::move(drawn));
             }
     }
     for (const TableSurface& surface : kSurfaces)
         for (const MethodOptions& method : tableMethods()) {
-            MesoSurfaceDescription described;
-            described.asset = "hemispheres", described.base = surface.base, described.method = method;
-            VCP_TRY_ASSIGN(auto drawn, drawnBy(described, nullptr, device));
+            VCP_TRY_ASSIGN(auto drawn,
+                           drawnBy({"hemispheres", surface.base, 4, method}, nullptr, device, arrays, progress));
             all.push_back(std::move(drawn));
         }
     // In rounds over all, so that whatever else the machine does falls on each; the first is a warm-up.

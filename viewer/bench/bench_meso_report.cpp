@@ -78,6 +78,37 @@ std::string plotOf(const std::vector<const BenchMesoRow*>& rows, std::string tit
     return plotSvg(plot);
 }
 
+/// A ratio that a paper prints, and of what it is here.
+struct Ratio {
+    const char *what, *method, *knob, *baseMethod, *baseKnob;
+    double least, most;
+    bool isOfRefinements = false;
+};
+constexpr Ratio kRatios[] = {
+    {"Table 1: DDM 2x1 over distance map", "ddm", "2x1 grid 64", "dm", "grid 64", 0.705, 0.855},
+    {"Table 1: DDM 4x1 over distance map", "ddm", "4x1 grid 64", "dm", "grid 64", 0.636, 0.735},
+    {"Table 1: DDM 8x1 over distance map", "ddm", "8x1 grid 64", "dm", "grid 64", 0.614, 0.709},
+    {"Table 2: distance map 128 over relief mapping", "dm", "grid 128", "relief-binary", "steps 32", 0.38, 1.05},
+    {"Table 2: DDM 4x1 128 over relief mapping", "ddm", "4x1 grid 128", "relief-binary", "steps 32", 0.10, 0.42},
+    {"Table 2: DDM 4x1 over distance map, 128", "ddm", "4x1 grid 128", "dm", "grid 128", 0.22, 0.50},
+    {"Table 2: DDM 4x1 over distance map, 128, cap 1", "ddm", "4x1 grid 128 cap 1", "dm", "grid 128 cap 1", 0.22, 0.50},
+    {"Table 2: DDM with quadrics 16 over relief mapping", "ddm-quadric-fitted", "4x1 grid 16", "relief-binary",
+     "steps 32", 0.34, 2.10},
+    {"Table 2: DDM with quadrics 16 over distance map 128", "ddm-quadric-fitted", "4x1 grid 16", "dm", "grid 128", 0.89,
+     2.4},
+    {"Table 3: DDM 4x1, compressed over not", "ddm-compressed", "4x1 grid 64", "ddm", "4x1 grid 64", 1, 1.05},
+    {"Risser: binary over secant, 5 steps", "relief-binary", "steps 5", "relief-secant", "steps 5", 5.0 / 3, 8.0 / 2,
+     true},
+    {"Wang: rate of GDM over VDM", "vdm", "rank 16 grid 32", "gdm", "rank 16 grid 32", 0.630, 0.686},
+    {"Wang: rate of GDM over slices, 64 x 64 x 16", "slices", "grid 64 layers 16", "gdm", "rank 16 grid 32 layers 16",
+     1.88, 1.88},
+    {"Wang: rate of GDM over slices, 64 x 64 x 32", "slices", "grid 64 layers 32", "gdm", "rank 16 grid 32 layers 32",
+     3.8, 3.8},
+    {"Wang: rate of GDM, 32 layers over 16", "gdm", "rank 16 grid 32 layers 16", "gdm", "rank 16 grid 32 layers 32",
+     0.95, 0.95},
+    {"Wang: rate of slices, 32 layers over 16", "slices", "grid 64 layers 16", "slices", "grid 64 layers 32", 0.47,
+     0.47}};
+
 /// The cost of a method on an asset, summed over the views; count 0 where it was not measured.
 struct Cost {
     double ratio = 0, fetches = 0, tests = 0, count = 0;
@@ -95,37 +126,13 @@ Cost costOf(const std::vector<BenchMesoRow>& rows, const std::string& asset, std
 
 }  // namespace
 
+bool isOfPublished(std::string_view method, std::string_view knob) {
+    return std::ranges::any_of(kRatios, [&](const Ratio& r) {
+        return (method == r.method && knob == r.knob) || (method == r.baseMethod && knob == r.baseKnob);
+    });
+}
+
 std::vector<MesoPublished> publishedOf(const std::vector<BenchMesoRow>& rows) {
-    struct Ratio {
-        const char *what, *method, *knob, *baseMethod, *baseKnob;
-        double least, most;
-        bool isOfRefinements = false;
-    };
-    constexpr Ratio kRatios[] = {
-        {"Table 1: DDM 2x1 over distance map", "ddm", "2x1 grid 64", "dm", "grid 64", 0.705, 0.855},
-        {"Table 1: DDM 4x1 over distance map", "ddm", "4x1 grid 64", "dm", "grid 64", 0.636, 0.735},
-        {"Table 1: DDM 8x1 over distance map", "ddm", "8x1 grid 64", "dm", "grid 64", 0.614, 0.709},
-        {"Table 2: distance map 128 over relief mapping", "dm", "grid 128", "relief-binary", "steps 32", 0.38, 1.05},
-        {"Table 2: DDM 4x1 128 over relief mapping", "ddm", "4x1 grid 128", "relief-binary", "steps 32", 0.10, 0.42},
-        {"Table 2: DDM 4x1 over distance map, 128", "ddm", "4x1 grid 128", "dm", "grid 128", 0.22, 0.50},
-        {"Table 2: DDM 4x1 over distance map, 128, cap 1", "ddm", "4x1 grid 128 cap 1", "dm", "grid 128 cap 1", 0.22,
-         0.50},
-        {"Table 2: DDM with quadrics 16 over relief mapping", "ddm-quadric-fitted", "4x1 grid 16", "relief-binary",
-         "steps 32", 0.34, 2.10},
-        {"Table 2: DDM with quadrics 16 over distance map 128", "ddm-quadric-fitted", "4x1 grid 16", "dm", "grid 128",
-         0.89, 2.4},
-        {"Table 3: DDM 4x1, compressed over not", "ddm-compressed", "4x1 grid 64", "ddm", "4x1 grid 64", 1, 1.05},
-        {"Risser: binary over secant, 5 steps", "relief-binary", "steps 5", "relief-secant", "steps 5", 5.0 / 3,
-         8.0 / 2, true},
-        {"Wang: rate of GDM over VDM", "vdm", "rank 16 grid 32", "gdm", "rank 16 grid 32", 0.630, 0.686},
-        {"Wang: rate of GDM over slices, 64 x 64 x 16", "slices", "grid 64 layers 16", "gdm",
-         "rank 16 grid 32 layers 16", 1.88, 1.88},
-        {"Wang: rate of GDM over slices, 64 x 64 x 32", "slices", "grid 64 layers 32", "gdm",
-         "rank 16 grid 32 layers 32", 3.8, 3.8},
-        {"Wang: rate of GDM, 32 layers over 16", "gdm", "rank 16 grid 32 layers 16", "gdm", "rank 16 grid 32 layers 32",
-         0.95, 0.95},
-        {"Wang: rate of slices, 32 layers over 16", "slices", "grid 64 layers 16", "slices", "grid 64 layers 32", 0.47,
-         0.47}};
     std::vector<std::string> assets;
     for (const BenchMesoRow& row : rows)
         if (std::ranges::find(assets, row.asset) == assets.end()) assets.push_back(row.asset);

@@ -299,7 +299,7 @@ RunCommand addBenchMeso(CLI::App& bench) {
                   "Also time frames of six models that the paper prints rates of, a covered pixel and a prism, by the "
                   "host or on the device");
     app->add_flag("--published", options.published,
-                  "Beside the ratios of the paper's tables (with --sweep, for those of times)");
+                  "Beside the ratios of the papers' tables, each method at the knobs that these are of");
     app->add_option("--remesh", command->remesh,
                     "Remeshing of the height fields as well: error in pixels, vertices and time, by cell and filter; "
                     "sweep, or tessellation: beside it, by a device's tessellator [sweep]")

@@ -12,6 +12,7 @@
 #include "mesostructure/base/surface_edges.h"
 #include "mesostructure/remesh/remesher.h"
 #include "mesostructure/solids.h"
+#include "viewer/asset/share_out.h"
 #include "viewer/scene/base_light.h"
 #include "viewer/scene/base_mesh.h"
 #include "viewer/scene/mesh_cache.h"
@@ -25,7 +26,11 @@ namespace {
 
 constexpr int kTexels = 256;
 
-Result<std::shared_ptr<const MarchArrays>> arraysOf(const Asset& asset, const MethodOptions& options) {
+Result<std::shared_ptr<const MarchArrays>> arraysOf(const Asset& asset, MethodOptions options,
+                                                    const SurfaceProgress& progress) {
+    options.shareOut = [&](size_t count, const auto& fill) {
+        return shareOut(count, fill, [&](double part) { return !progress || progress("displacement map", part); });
+    };
     VCP_TRY_ASSIGN(const auto shape, shapeOf(asset));
     VCP_TRY_ASSIGN(const auto method, buildMethod(asset, *shape, options));
     VCP_TRY_ASSIGN(auto arrays, method.arrays());
@@ -286,9 +291,10 @@ Result<MesoScene> makeMesoScene(std::span<const MesoSurfaceDescription> descript
             scene.surfaces.push_back(*std::move(surface));
             continue;
         }
-        auto arrays = arraysOf(*asset, d.method);
+        auto arrays = arraysOf(*asset, d.method, progress);
         if (!arrays) {
             Error error = arrays.error();
+            if (error.code == ErrorCode::Cancelled) return error;
             if (error.file.empty() && error.code != ErrorCode::Usage) error.file = d.asset;
             return d.from.blamed(std::move(error));
         }
