@@ -50,16 +50,6 @@ cp "$images/../scenes/beads_dog.json" "$scratch"
 # Iterations of five methods on the same rays.
 draw heat '{"asset": "hemispheres", "tiles": 2}' --methods relief-binary,dm,ddm,ddm-quadric,boxes --shading steps --size 200x110 --camera 30,12,1.5
 
-# The figures of Wang et al. 2004: their method and ours, on an open surface also its rival's.
-draw fig8 '{"asset": "weave", "tiles": 2, '"$clay}" --methods vdm,gdm,boxes --shadows --size 240x160 --camera 30,12,1.5
-draw fig9_vase '{"asset": "bars", "surface": "vase", "tiles": 6, "base": false, '"$clay}" --methods gdm,boxes --shadows --size 240x260 --camera 30,15,1.5
-draw fig9_torus '{"asset": "chain", "surface": "torus", "tiles": 4, '"$gold}" --methods gdm,boxes --shadows --size 240x180 --camera 30,35,1.5
-draw fig9_bird '{"asset": "weave", "surface": "bird", "tiles": 3, '"$clay}" --methods gdm,boxes --shadows --size 240x180 --camera=-40,35,1.7
-draw fig9_dinosaur '{"asset": "scales", "surface": "dinosaur", "tiles": 4, '"$clay}" --methods gdm,boxes --shadows --size 240x180 --camera=-60,15,1.7
-"$build/vcp" meso build bark -o "$scratch/bark.meso" --transfer 48 --albedo 0.6 --progress none
-rest='"environment": {"source": "studio"}' \
-    draw fig10 '{"asset": "bark.meso", "surface": "tree", "tiles": 1, "transfer": true, '"$clay}" --methods gdm,boxes --size 240x260 --camera 30,10,1.6
-
 # The ball goes through the maze.
 n=0
 for place in "0.11, 0.11" "0.11, 0.36" "-0.14, 0.36" "-0.39, 0.36"; do
