@@ -28,7 +28,11 @@ constexpr int kTexels = 256;
 // Levels of larger maps are averages: least volumes would take minutes.
 constexpr size_t kMostFittedTexels = size_t{1} << 20;
 
-Result<std::shared_ptr<const MarchArrays>> arraysOf(const Asset& asset, const MethodOptions& options) {
+Result<std::shared_ptr<const MarchArrays>> arraysOf(const Asset& asset, MethodOptions options,
+                                                    const SurfaceProgress& progress) {
+    options.shareOut = [&](size_t count, const auto& fill) {
+        return shareOut(count, fill, [&](double part) { return !progress || progress("displacement map", part); });
+    };
     VCP_TRY_ASSIGN(const auto shape, shapeOf(asset));
     VCP_TRY_ASSIGN(const auto method, buildMethod(asset, *shape, options));
     VCP_TRY_ASSIGN(auto arrays, method.arrays());
@@ -160,18 +164,22 @@ public:
         bases_.back().isAsked = isAsking(d);
         return {};
     }
-    /// Gives its transfer to each surface that asks for it.
-    void trace(std::span<const MesoSurfaceDescription> descriptions, MesoScene& scene) const {
-        if (bases_.empty()) return;
+    /// Gives its transfer to each surface that asks for it. Errors: Cancelled.
+    Result<void> trace(std::span<const MesoSurfaceDescription> descriptions, MesoScene& scene,
+                       const SurfaceProgress& progress) const {
+        if (bases_.empty()) return {};
         const auto cache = defaultCacheFolder();
-        const auto traced = traceBases(bases_, cache ? *cache : std::filesystem::path());
+        const auto traced = traceBases(bases_, cache ? *cache : std::filesystem::path(),
+                                       [&](double part) { return !progress || progress("light of bases", part); });
         if (!traced) {
+            if (traced.error().code == ErrorCode::Cancelled) return traced.error();
             scene.warnings.push_back(traced.error().message + "; the bases do not shade each other");
-            return;
+            return {};
         }
         size_t next = 0;
         for (size_t i = 0; i < descriptions.size(); ++i)
             if (descriptions[i].path.points.empty()) scene.surfaces[i].baseTransfer = (*traced)[next++];
+        return {};
     }
 
 private:
@@ -195,8 +203,9 @@ void warn(const MesoSurfaceDescription& d, const BaseSurface& base, const Shell&
     say(shell.withoutArea, "triangles without area are left out");
     say(shell.withoutMap, "triangles whose texture coordinates have no area: the mesostructure is smeared there");
     say(shell.flat, "pieces of the shell have no volume and are left out: faces on their own backs have no outside");
-    say(shell.inverted,
-        "pieces of the shell are turned inside out: the surface bends more sharply than the mesostructure is high");
+    say(shell.cut,
+        "columns of the shell are cut: the surface bends more sharply inwards than the mesostructure is high");
+    say(shell.inverted, "pieces of the shell are turned inside out: the surface folds there");
 }
 
 }  // namespace
@@ -261,7 +270,7 @@ Result<Asset> openMesoAsset(const std::string& name) {
     return asset;
 }
 
-Result<MesoScene> makeMesoScene(std::span<const MesoSurfaceDescription> descriptions) {
+Result<MesoScene> makeMesoScene(std::span<const MesoSurfaceDescription> descriptions, const SurfaceProgress& progress) {
     MesoScene scene;
     Textures textures;
     Remeshing remeshing;
@@ -269,6 +278,8 @@ Result<MesoScene> makeMesoScene(std::span<const MesoSurfaceDescription> descript
     std::map<std::string, Transfer> transfers;  // an asset is read once for each surface, and kept once
     SceneBases bases(descriptions);
     for (const MesoSurfaceDescription& d : descriptions) {
+        const double part = double(scene.paths.size()) / double(descriptions.size());
+        if (progress && !progress("mesostructure", part)) return Error::cancelled();
         SurfacePath& path = scene.paths.emplace_back(d.path);
         for (glm::dvec3& point : path.points) point -= d.place;
         auto asset = openMesoAsset(d.asset);
@@ -288,9 +299,10 @@ Result<MesoScene> makeMesoScene(std::span<const MesoSurfaceDescription> descript
             scene.surfaces.push_back(*std::move(surface));
             continue;
         }
-        auto arrays = arraysOf(*asset, d.method);
+        auto arrays = arraysOf(*asset, d.method, progress);
         if (!arrays) {
             Error error = arrays.error();
+            if (error.code == ErrorCode::Cancelled) return error;
             if (error.file.empty() && error.code != ErrorCode::Usage) error.file = d.asset;
             return d.from.blamed(std::move(error));
         }
@@ -323,7 +335,7 @@ Result<MesoScene> makeMesoScene(std::span<const MesoSurfaceDescription> descript
         surface.withBase = d.withBase;
         scene.surfaces.push_back(std::move(surface));
     }
-    bases.trace(descriptions, scene);
+    VCP_TRY(bases.trace(descriptions, scene, progress));
     return scene;
 }
 

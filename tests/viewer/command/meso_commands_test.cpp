@@ -364,6 +364,30 @@ TEST_F(MesoCommands, BenchHasTheFieldsThatProgramsRelyOn) {
     EXPECT_EQ(run("bench meso nothing").status, 2);
 }
 
+TEST_F(MesoCommands, BenchMeasuresWhatPrismsDistort) {
+    const Ran ran =
+        run("bench meso ball --methods sphere --views 45 --rays 2000 --repetitions 1 --prisms --progress "
+            "none --json --out " +
+            path("report"));
+    ASSERT_EQ(ran.status, 0) << ran.err;
+    const Json report = Json::parse(ran.out);
+    ASSERT_EQ(report["prisms"].size(), 12u);
+    for (size_t i = 0; i < 12; ++i) {
+        const Json& row = report["prisms"][i];
+        EXPECT_EQ(row["rays"], 2000);
+        EXPECT_LT(row["between"], 500) << row;
+        // What differs between the maps of one prism falls as it turns less, and so does what a torus has of corners.
+        if (i % 4 == 0) continue;
+        const Json& coarser = report["prisms"][i - 1];
+        for (const char* map : {"straight", "tetrahedra", "curved_smooth"}) {
+            const std::string field = std::string(map) + "_p95_texels";
+            EXPECT_LT(row[field].get<double>(), 0.65 * coarser[field].get<double>()) << field << ", row " << i;
+        }
+    }
+    // Without normals there is none to judge.
+    for (const Json& row : report["rows"]) EXPECT_TRUE(row["normal_p50_degrees"].is_null()) << row;
+}
+
 TEST_F(MesoCommands, RendersOnMeshesWithTextureCoordinates) {
     std::ofstream(path("mapped.obj"))
         << "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3 4/4\n";
