@@ -60,16 +60,11 @@ BaseSurface cylinder(double tiles) {
     return made;
 }
 
-BaseSurface torus(double tiles) {
-    BaseSurface made;
-    addSheet(
-        made, 96, 40,
-        [](double u, double v) {
-            const double r = 1 + 0.45 * std::cos(2 * pi * v);
-            return dvec3(r * std::cos(2 * pi * u), r * std::sin(2 * pi * u), 0.45 * std::sin(2 * pi * v));
-        },
-        [&](double u, double v) { return tiles * dvec2(3 * u, v); });
-    return made;
+/// Joins corners that are one but for their last bits, as the two ends of a turn are.
+void joinRounded(BaseSurface& surface) {
+    for (dvec3& p : surface.positions)
+        for (int axis = 0; axis < 3; ++axis) p[axis] = std::round(p[axis] * 0x1p40) * 0x1p-40;
+    joinPositions(surface);
 }
 
 template <class Point>
@@ -176,7 +171,7 @@ Result<BaseSurface> makeBaseSurface(std::string_view name, double tiles) {
     else if (name == "cylinder")
         made = cylinder(tiles);
     else if (name == "torus")
-        made = torus(tiles);
+        return torusSurface(tiles, {96, 40});
     else if (name == "teapot")
         addRound(made, kBody, tiles), addRound(made, kLid, tiles), addTube(made, kHandle, tiles),
             addTube(made, kSpout, tiles);
@@ -186,11 +181,21 @@ Result<BaseSurface> makeBaseSurface(std::string_view name, double tiles) {
         return Error{.code = ErrorCode::Usage,
                      .message = fmt::format("there is no base surface \"{}\"; there are {}", name,
                                             fmt::join(kSurfaceNames, ", "))};
-    // The two ends of a turn would differ in their last bits.
-    for (dvec3& p : made.positions)
-        for (int axis = 0; axis < 3; ++axis) p[axis] = std::round(p[axis] * 0x1p40) * 0x1p-40;
-    joinPositions(made);
+    joinRounded(made);
     leaveOutPoints(made);
+    return made;
+}
+
+BaseSurface torusSurface(double tiles, glm::ivec2 cells) {
+    BaseSurface made;
+    addSheet(
+        made, cells.x, cells.y,
+        [](double u, double v) {
+            const double r = 1 + kTorusTube * std::cos(2 * pi * v);
+            return dvec3(r * std::cos(2 * pi * u), r * std::sin(2 * pi * u), kTorusTube * std::sin(2 * pi * v));
+        },
+        [&](double u, double v) { return tiles * dvec2(kTorusRingTiles * u, v); });
+    joinRounded(made);
     return made;
 }
 

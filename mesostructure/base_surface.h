@@ -32,6 +32,13 @@ std::span<const std::string_view> baseSurfaceNames();
 /// (no such name, tiles not above 0).
 Result<BaseSurface> makeBaseSurface(std::string_view name, double tiles);
 
+/// The torus of makeBaseSurface: the radius of its tube, that of its ring being 1, and the tiles round the ring for
+/// each round the tube.
+inline constexpr double kTorusTube = 0.45;
+inline constexpr int kTorusRingTiles = 3;
+/// Makes it of so many cells, two triangles each, round the ring and round the tube.
+BaseSurface torusSurface(double tiles, glm::ivec2 cells);
+
 /// Gives equal positions one number, in the order in which they first come.
 void joinPositions(BaseSurface& surface);
 

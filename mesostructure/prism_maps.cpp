@@ -19,11 +19,17 @@ constexpr double kPrismSlack = 1e-12;  // by which tetrahedra are met wider than
 
 using Face = std::array<int, 3>;
 
+/// Returns a triangle's area vector, twice its area along its normal.
+dvec3 areaOf(const PrismCorners& prism, const Face& face) {
+    const dvec3 a = prism.world[face[0]];
+    return glm::cross(prism.world[face[1]] - a, prism.world[face[2]] - a);
+}
+
 /// Returns where a ray passes a triangle's plane; infinity where it never does.
 double passesPlane(const PrismCorners& prism, const Face& face, dvec3 origin, dvec3 direction) {
-    const dvec3 a = prism.world[face[0]], normal = glm::cross(prism.world[face[1]] - a, prism.world[face[2]] - a);
+    const dvec3 normal = areaOf(prism, face);
     const double towards = glm::dot(normal, direction);
-    return towards == 0 ? kInfinity : glm::dot(normal, a - origin) / towards;
+    return towards == 0 ? kInfinity : glm::dot(normal, prism.world[face[0]] - origin) / towards;
 }
 
 /// Returns the weights of a face's second and third corner where a ray passes it; nothing where it passes beside it.
@@ -43,15 +49,15 @@ double printedExit(const PrismCorners& prism, dvec3 origin, dvec3 direction, dou
         const double t = passesPlane(prism, face, origin, direction);
         return t > enter + 1e-9 ? t : kInfinity;
     };
+    dvec3 middle(0);
+    for (const dvec3 corner : prism.world) middle += corner / 6.0;
     double exit = std::min(ahead(kPrismFaces[0]), ahead(kPrismFaces[1]));
     for (size_t side = 2; side < 8; side += 2) {
         const Face &one = kPrismFaces[side], &other = kPrismFaces[side + 1];
         // The corner of the other triangle that is not on the diagonal; the middle of the prism is inside.
         const int apart =
             *std::ranges::find_if(other, [&](int corner) { return std::ranges::find(one, corner) == one.end(); });
-        dvec3 middle(0);
-        for (const dvec3 corner : prism.world) middle += corner / 6.0;
-        const dvec3 a = prism.world[one[0]], normal = glm::cross(prism.world[one[1]] - a, prism.world[one[2]] - a);
+        const dvec3 a = prism.world[one[0]], normal = areaOf(prism, one);
         const bool isConvex = glm::dot(normal, prism.world[apart] - a) * glm::dot(normal, middle - a) >= 0;
         const double first = ahead(one), second = ahead(other);
         exit = std::min(exit, isConvex ? std::min(first, second) : std::max(first, second));

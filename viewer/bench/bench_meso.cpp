@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <ctime>
 #include <memory>
 #include <numbers>
 #include <random>
@@ -212,11 +211,10 @@ std::vector<MesoMarched> marchHere(const std::vector<Measured>& methods, const s
     for (int round = 0; round <= rounds; ++round)
         for (size_t m = 0; m < methods.size(); ++m) {
             all[m].results.resize(rays.size());
-            const std::clock_t start = std::clock();
+            const double start = processorNs();
             for (size_t i = 0; i < rays.size(); ++i) all[m].results[i] = methods[m].marcher->march(rays[i]);
             if (round > 0)
-                all[m].nsPerRay.push_back(double(std::clock() - start) * 1e9 / CLOCKS_PER_SEC /
-                                          double(std::max<size_t>(1, rays.size())));
+                all[m].nsPerRay.push_back((processorNs() - start) / double(std::max<size_t>(1, rays.size())));
         }
     return all;
 }

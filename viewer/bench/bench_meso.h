@@ -11,6 +11,7 @@
 
 #include <array>
 #include <cstdint>
+#include <ctime>
 #include <functional>
 #include <optional>
 #include <string>
@@ -216,6 +217,9 @@ Result<std::vector<MesoFactors>> compareMesoFactors(const meso::Asset& asset, co
 /// traceTransfer's; Usage (nothing is seen).
 Result<std::vector<MesoLight>> compareMesoLight(const std::string& name, const meso::Asset& asset,
                                                 const meso::Shape& shape, const std::function<bool(double)>& progress);
+
+/// Returns the processor's time of this process so far, all threads, in nanoseconds.
+inline double processorNs() { return double(std::clock()) * 1e9 / CLOCKS_PER_SEC; }
 
 /// Measures what maps of prisms distort, on tori of several curvatures and numbers of triangles.
 std::vector<MesoPrisms> compareMesoPrisms(uint64_t rays);

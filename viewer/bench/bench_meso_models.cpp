@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <ctime>
 #include <map>
 
 #include <fmt/format.h>
@@ -156,10 +155,10 @@ Result<Drawn> drawnBy(const Subject& subject, const Transferred* light, const st
 
 Result<void> draw(Drawn& drawn, bool isCounted) {
     VCP_TRY(drawn.renderer->update(drawn.request));
-    const std::clock_t start = std::clock();
+    const double start = processorNs();
     VCP_TRY_ASSIGN(const auto stats, drawn.renderer->render(drawn.request));
     const bool isProcessor = drawn.renderer->device().software;
-    const double ns = isProcessor ? double(std::clock() - start) * 1e9 / CLOCKS_PER_SEC : 1e6 * stats.msFrame;
+    const double ns = isProcessor ? processorNs() - start : 1e6 * stats.msFrame;
     drawn.row.pixels = stats.hitPixels, drawn.row.unresolved = stats.unresolvedRays;
     drawn.row.device = drawn.renderer->device().name;
     if (isCounted) drawn.ns.push_back(ns);

@@ -4,11 +4,9 @@
 #include <numbers>
 #include <random>
 
-#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
 #include "builder/measure/quantile.h"
-#include "mesostructure/base_sheet.h"
 #include "mesostructure/prism_maps.h"
 #include "viewer/bench/bench_meso.h"
 
@@ -19,50 +17,34 @@ namespace {
 using namespace meso;
 using glm::dvec2, glm::dvec3, std::numbers::pi;
 
-constexpr double kTube = 0.45;      // radius of the tube; that of the ring is 1
 constexpr double kTexels = 128;     // along a tile's edge
 constexpr dvec3 kTile{1, 1, 0.25};  // and its height
-constexpr int kRingOverTube = 3;    // tiles
-
-/// `across`: cells round the tube.
-BaseSurface torus(double tiles, int across) {
-    BaseSurface made;
-    addSheet(
-        made, int(std::lround(2.4 * across)), across,
-        [](double u, double v) {
-            const double r = 1 + kTube * std::cos(2 * pi * v);
-            return dvec3(r * std::cos(2 * pi * u), r * std::sin(2 * pi * u), kTube * std::sin(2 * pi * v));
-        },
-        [&](double u, double v) { return tiles * dvec2(kRingOverTube * u, v); });
-    for (dvec3& p : made.positions) p = glm::round(p * 0x1p40) * 0x1p-40;
-    joinPositions(made);
-    return made;
-}
 
 /// Returns the place in the tile of a place over the smooth torus, in the period that is next to another one.
 dvec3 smoothPlace(dvec3 p, double tiles, double height, dvec3 near) {
     const double ring = std::hypot(p.x, p.y) - 1;
-    dvec3 place = tiles / (2 * pi) * dvec3(kRingOverTube * std::atan2(p.y, p.x), std::atan2(p.z, ring), 0);
-    const dvec2 period(tiles * kRingOverTube, tiles);
+    dvec3 place = tiles / (2 * pi) * dvec3(kTorusRingTiles * std::atan2(p.y, p.x), std::atan2(p.z, ring), 0);
+    const dvec2 period(tiles * kTorusRingTiles, tiles);
     for (int axis = 0; axis < 2; ++axis)
         place[axis] += period[axis] * std::round((near[axis] - place[axis]) / period[axis]);
-    place.z = (std::hypot(ring, p.z) - kTube) / height * kTile.z;
+    place.z = (std::hypot(ring, p.z) - kTorusTube) / height * kTile.z;
     return place;
 }
 
+/// `across`: cells round the tube.
 MesoPrisms measured(double tiles, int across, uint64_t rays) {
-    const BaseSurface surface = torus(tiles, across);
+    const BaseSurface surface = torusSurface(tiles, {int(std::lround(2.4 * across)), across});
     const double height = tileEdge(surface) * kTile.z;
     Shell shell;
     const std::vector<ShellPiece> pieces = shellPieces(surface, height, kTile, 0, shell);
     MesoPrisms row;
-    row.turnDegrees = 360.0 / across, row.heightOverRadius = height / kTube;
+    row.turnDegrees = 360.0 / across, row.heightOverRadius = height / kTorusTube;
     row.prisms = surface.triangles.size(), row.cutColumns = shell.cut;
     std::mt19937_64 random(41);
     std::uniform_real_distribution<double> unit(0, 1);
     std::vector<double> straight, linear, straightSmooth, linearSmooth, curvedSmooth;
     uint64_t printedWrong = 0;
-    while (row.rays < rays) {
+    for (; row.rays < rays; ++row.rays) {
         const auto prism = size_t(unit(random) * double(pieces.size() / 3));
         const std::span<const ShellPiece, 3> own(&pieces[3 * prism], 3);
         const PrismCorners corners = prismOf(own);
@@ -74,7 +56,6 @@ MesoPrisms measured(double tiles, int across, uint64_t rays) {
         const auto in = linearPlace(own, place.world);
         if (!passage || !in) {
             ++row.between;  // between the bilinear side and its two triangles
-            ++row.rays;
             continue;
         }
         const dvec3 world = place.world + shell.origin, smooth = smoothPlace(world, tiles, height, place.tile);
@@ -84,7 +65,6 @@ MesoPrisms measured(double tiles, int across, uint64_t rays) {
         linearSmooth.push_back(kTexels * glm::distance(*in, smooth));
         curvedSmooth.push_back(kTexels * glm::distance(place.tile, smooth));
         printedWrong += std::abs(passage->printedLeave - passage->leave) > 1e-9 * height;
-        ++row.rays;
     }
     const auto of = [](std::vector<double>& all) {
         return MesoDistortion{upperQuantile(all, 0.5), upperQuantile(all, 0.95)};
