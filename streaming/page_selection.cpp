@@ -42,30 +42,44 @@ double refinedError(const Dataset& dataset, const PageEntry& page, const Selecti
 
 namespace {
 
-/// Returns a length in pixels, at the point of a page's box nearest to the eye; infinite where the eye is inside of it.
-double projected(double length, const Dataset& dataset, const PageEntry& page, const SelectionView& view) {
+/// A cube of the world: a page's, or that of one of its octants.
+struct WorldCube {
+    glm::dvec3 low;
+    double edge;
+
+    [[nodiscard]] WorldCube octant(uint32_t octant) const {
+        const double half = 0.5 * edge;
+        return {low + half * glm::dvec3(octant & 1, octant >> 1 & 1, octant >> 2), half};
+    }
+};
+
+WorldCube cubeOf(const Dataset& dataset, const PageEntry& page) {
+    return {dataset.originOf(page), dataset.edgeOf(page)};
+}
+
+/// Returns a length in pixels, at the point of a cube nearest to the eye; infinite where the eye is inside of it.
+double projected(double length, const WorldCube& cube, const SelectionView& view) {
     if (length <= 0) return 0;
     const double wide = length * view.pixelsPerUnit;
     if (view.orthographic) return wide;
-    const glm::dvec3 lo = dataset.originOf(page), hi = lo + dataset.edgeOf(page);
-    const double distance = glm::length(glm::clamp(view.eye, lo, hi) - view.eye);
+    const double distance = glm::length(glm::clamp(view.eye, cube.low, cube.low + cube.edge) - view.eye);
     return distance > 0 ? wide / distance : kInfinity;
 }
 
 /// Returns the same, seen from no nearer than a cell.
-double shown(double length, const Dataset& dataset, const PageEntry& page, const SelectionView& view) {
-    const double wide = projected(length, dataset, page, view);
-    return view.orthographic ? wide : std::min(wide, length * view.pixelsPerUnit / dataset.cellOf(page.level));
+double shown(double length, double cell, const WorldCube& cube, const SelectionView& view) {
+    const double wide = projected(length, cube, view);
+    return view.orthographic ? wide : std::min(wide, length * view.pixelsPerUnit / cell);
 }
 
 }  // namespace
 
 double projectedError(const Dataset& dataset, const PageEntry& page, const SelectionView& view) {
-    return projected(refinedError(dataset, page, view), dataset, page, view);
+    return projected(refinedError(dataset, page, view), cubeOf(dataset, page), view);
 }
 
 double shownError(const Dataset& dataset, const PageEntry& page, const SelectionView& view) {
-    return shown(double(page.certifiedError), dataset, page, view);
+    return shown(double(page.certifiedError), dataset.cellOf(page.level), cubeOf(dataset, page), view);
 }
 
 bool inFrustum(const Dataset& dataset, const PageEntry& page, const SelectionView& view) {
@@ -88,20 +102,43 @@ namespace {
 // Where a view allows no error, errors are compared as multiples of this.
 constexpr double kLeastErrorPixels = 1e-9;
 
-/// Returns the page's error in the view; 0 for pages outside of the view.
-double errorInView(const Dataset& dataset, uint64_t page, const SelectionView& view) {
-    const PageEntry& entry = dataset.pages[page];
-    return inFrustum(dataset, entry, view) ? projectedError(dataset, entry, view) : 0;
-}
-
 bool isTooCoarse(double error, const SelectionView& view) { return error > view.errorPixels; }
 
 /// Whether single children may replace a page in their octants: it has to have nodes that lie in one octant each.
 bool canBePartial(const Dataset& dataset, const PageEntry& page) { return dataset.isCovering() && page.leaves > 1; }
 
-/// Whether rays may begin inside of a box: those of a parallel projection begin in a plane through the eye.
-bool holdsOrigins(glm::dvec3 corner, double edge, const SelectionView& view) {
-    const glm::dvec3 half(0.5 * edge), middle = corner + half - view.eye;
+/// The error of a page in a view, octant by octant where single children may replace it; 0 outside of the view.
+struct PageError {
+    std::array<double, 8> octant{};  ///< of those that have a child
+
+    PageError(const Dataset& dataset, const PageEntry& page, const SelectionView& view) {
+        if (page.childMask == 0 || !inFrustum(dataset, page, view)) return;
+        const double error = refinedError(dataset, page, view);
+        const WorldCube cube = cubeOf(dataset, page);
+        const bool isPartial = canBePartial(dataset, page);
+        if (!isPartial) octant.fill(projected(error, cube, view));
+        for (uint32_t o = 0; isPartial && o < 8; ++o)
+            if ((page.childMask >> o & 1) != 0) octant[o] = projected(error, cube.octant(o), view);
+    }
+    /// Returns the largest error of some octants.
+    [[nodiscard]] double of(uint8_t octants) const {
+        double most = 0;
+        for (uint32_t o = 0; o < 8; ++o)
+            if ((octants >> o & 1) != 0) most = std::max(most, octant[o]);
+        return most;
+    }
+    /// Returns the octants in which it is more than the view allows.
+    [[nodiscard]] uint8_t tooCoarse(const PageEntry& page, const SelectionView& view) const {
+        uint8_t octants = 0;
+        for (uint32_t o = 0; o < 8; ++o)
+            if (isTooCoarse(octant[o], view)) octants = uint8_t(octants | 1u << o);
+        return octants & page.childMask;
+    }
+};
+
+/// Whether rays may begin inside of a cube: those of a parallel projection begin in a plane through the eye.
+bool holdsOrigins(const WorldCube& cube, const SelectionView& view) {
+    const glm::dvec3 half(0.5 * cube.edge), middle = cube.low + half - view.eye;
     if (!view.orthographic) return glm::all(glm::lessThanEqual(glm::abs(middle), half));
     const glm::dvec3 forward = glm::cross(glm::dvec3(view.planes[0]), glm::dvec3(view.planes[2]));
     return std::abs(glm::dot(middle, forward)) <= glm::dot(half, glm::abs(forward));
@@ -109,22 +146,21 @@ bool holdsOrigins(glm::dvec3 corner, double edge, const SelectionView& view) {
 
 /// Returns the octants of a page that errs by so much in the view, whose children it wants. `seen`: what its rays hit;
 /// null: all pages count as hit.
-uint8_t octantsWanted(const Dataset& dataset, uint64_t page, double error, const SelectionView& view,
+uint8_t octantsWanted(const Dataset& dataset, uint64_t page, const PageError& error, const SelectionView& view,
                       const PagesSeen* seen) {
     const PageEntry& entry = dataset.pages[page];
-    if (!isTooCoarse(error, view)) return 0;
-    if (seen == nullptr || error > kUnseenErrors * view.errorPixels) return entry.childMask;
-    const glm::dvec3 corner = dataset.originOf(entry);
-    const double edge = dataset.edgeOf(entry);
+    const uint8_t coarse = error.tooCoarse(entry, view);
+    if (seen == nullptr || coarse == 0) return coarse;
+    const WorldCube cube = cubeOf(dataset, entry);
     if (!canBePartial(dataset, entry))
-        return seen->contains(page) || holdsOrigins(corner, edge, view) ? entry.childMask : uint8_t{0};
+        return error.octant[0] > kUnseenErrors * view.errorPixels || seen->contains(page) || holdsOrigins(cube, view)
+                   ? coarse
+                   : uint8_t{0};
     uint8_t wanted = 0;
-    for (uint32_t octant = 0; octant < 8; ++octant) {
-        if ((entry.childMask >> octant & 1) == 0) continue;
-        const glm::dvec3 upper(octant & 1, octant >> 1 & 1, octant >> 2);
-        if (seen->contains(childIn(entry, octant)) || holdsOrigins(corner + 0.5 * edge * upper, 0.5 * edge, view))
-            wanted = uint8_t(wanted | 1u << octant);
-    }
+    for (uint32_t o = 0; o < 8; ++o)
+        if ((coarse >> o & 1) != 0 && (error.octant[o] > kUnseenErrors * view.errorPixels ||
+                                       seen->contains(childIn(entry, o)) || holdsOrigins(cube.octant(o), view)))
+            wanted = uint8_t(wanted | 1u << o);
     return wanted;
 }
 
@@ -134,11 +170,11 @@ Candidate candidate(const ChoosingDataset& of, uint32_t number, uint64_t page) {
     Candidate made{0, page, 0, number};
     for (size_t i = 0; i < of.views.size(); ++i) {
         const SelectionView& view = of.views[i];
-        const double error = errorInView(of.dataset, page, view);
+        const PageError error(of.dataset, of.dataset.pages[page], view);
         const uint8_t octants = octantsWanted(of.dataset, page, error, view, of.seen.empty() ? nullptr : of.seen[i]);
         if (octants == 0) continue;
         made.octants |= octants;
-        made.error = std::max(made.error, error / std::max(view.errorPixels, kLeastErrorPixels));
+        made.error = std::max(made.error, error.of(octants) / std::max(view.errorPixels, kLeastErrorPixels));
     }
     return made;
 }
@@ -300,11 +336,11 @@ private:
 
     void visit(const Place& at) {
         const PageEntry& entry = dataset_.pages[at.page];
-        const double error = errorInView(dataset_, at.page, view_);
+        const PageError error(dataset_, entry, view_);
         const uint8_t asked = octantsWanted(dataset_, at.page, error, view_, seen_);
         const uint8_t wanted = at.isWanted ? count(at.page, asked) : uint8_t{0};
         // What nobody wants any more is drawn as long as it is there, but not where all are relaxed together.
-        const uint8_t allowed = choice_.relaxed ? wanted : isTooCoarse(error, view_) ? entry.childMask : uint8_t{0};
+        const uint8_t allowed = choice_.relaxed ? wanted : error.tooCoarse(entry, view_);
         const uint8_t there =
             at.isSeen ? octantsWhere(dataset_, entry, allowed, [&](uint64_t child) { return resident_[child] != 0; })
                       : uint8_t{0};
@@ -328,18 +364,27 @@ private:
     }
 
     /// Draws a page but where children are drawn in its place.
-    void draw(uint64_t page, double error, uint8_t asked, uint8_t there) {
+    void draw(uint64_t page, const PageError& error, uint8_t asked, uint8_t there) {
         const PageEntry& entry = dataset_.pages[page];
         const auto own = uint8_t(entry.childMask & ~there);
-        const auto unseen = isTooCoarse(error, view_) ? uint8_t(own & ~asked) : uint8_t{0};
+        const auto unseen = uint8_t(own & error.tooCoarse(entry, view_) & ~asked);
         drawable_.cut.push_back(page);
         drawable_.pagesUnseen += uint64_t(std::popcount(unseen));
-        if (canBePartial(dataset_, entry) && (there != 0 || unseen != 0)) drawable_.partial.push_back({page, own});
-        if (error <= 0 || (unseen != 0 && unseen == own)) return;
-        drawable_.errorPixels = std::max(drawable_.errorPixels, shownError(dataset_, entry, view_));
+        const bool isPartial = canBePartial(dataset_, entry);
+        if (isPartial && (there != 0 || unseen != 0)) drawable_.partial.push_back({page, own});
+        if (!inFrustum(dataset_, entry, view_) || (unseen != 0 && unseen == own)) return;
+        const WorldCube cube = cubeOf(dataset_, entry);
+        if (!isPartial || entry.childMask == 0) return show(entry, cube);
+        for (uint32_t o = 0; o < 8; ++o)
+            if (((own & ~unseen) >> o & 1) != 0) show(entry, cube.octant(o));
+    }
+
+    /// Counts a page's error, or that of an octant in which it is drawn.
+    void show(const PageEntry& entry, const WorldCube& cube) {
+        const double cell = dataset_.cellOf(entry.level);
+        drawable_.errorPixels = std::max(drawable_.errorPixels, shown(double(entry.certifiedError), cell, cube, view_));
         if (isColourOff(entry, view_))
-            drawable_.colourPixels =
-                std::max(drawable_.colourPixels, shown(dataset_.cellOf(entry.level), dataset_, entry, view_));
+            drawable_.colourPixels = std::max(drawable_.colourPixels, shown(cell, cell, cube, view_));
     }
 
     const Dataset& dataset_;

@@ -11,9 +11,9 @@
 // children: it is what is drawn when they have to go.
 //
 // Where pages cover the surface of those below them (kFlagCovering), a page is refined octant by octant: a child
-// replaces its parent there, and elsewhere the parent is drawn. So only children that the view's rays ask for are
-// wanted (streaming/pages_seen.h), and the others only where their parent's error is above kUnseenErrors times what is
-// allowed: what lies behind other surfaces is not read, but what comes into view is nearly fine enough. What is drawn
+// replaces its parent there, and elsewhere the parent is drawn. So its error counts at the point of the octant nearest
+// to the eye, and only children that the view's rays ask for are wanted (streaming/pages_seen.h), and the others only
+// where their parent's error is above kUnseenErrors times what is allowed: what lies behind other surfaces is not read, but what comes into view is nearly fine enough. What is drawn
 // is as fine as what is there allows. Elsewhere a page is replaced by all its children or none.
 //
 // Several views, and several datasets of one scene, share one choice and one budget: a page is refined where any of

@@ -110,6 +110,42 @@ TEST(PageSelection, BudgetIsNeverExceededAndRelaxesEvenly) {
     }
 }
 
+/// The full tree, of pages that cover those below them and may be drawn octant by octant.
+Dataset coveringTree(uint32_t levels, double error) {
+    Dataset dataset = fullTree(levels, error);
+    dataset.header.flags |= kFlagCovering;
+    for (uint64_t i = 0; i < dataset.pages.size(); ++i) dataset.pages[i].leaves = 64;
+    return dataset;
+}
+
+TEST(PageSelection, OnlyOctantsThatErrTooMuchAreRefined) {
+    const Input in(coveringTree(2, 0.01));
+    // The root errs by 10 / distance pixels: its lower octants along x are nearer than 12, its upper ones are not.
+    const SelectionView view = viewFrom({-11.8, 0.5, 0.5}, 10 / 12.0);
+    const Selection selection = in.select(view);
+    ASSERT_EQ(selection.partial.size(), 1u);
+    EXPECT_EQ(selection.partial[0], (PartialPage{0, 0b10101010}));
+    EXPECT_EQ(selection.wanted.size(), 5u);
+    EXPECT_EQ(selection.cut.size(), 5u);
+    EXPECT_TRUE(selection.complete);
+    // What is left of the root is 12.3 away.
+    EXPECT_NEAR(selection.errorPixels, 10 / 12.3, 1e-6);
+    EXPECT_EQ(in.select(viewFrom({-12.1, 0.5, 0.5}, 10 / 12.0)).cut, std::vector<uint64_t>{0});
+    EXPECT_EQ(in.select(viewFrom({-11.4, 0.5, 0.5}, 10 / 12.0)).cut.size(), 8u);
+}
+
+TEST(PageSelection, WhatOctantsShowIsAsGoodAsAsked) {
+    const Input in(coveringTree(5, 0.01));
+    for (const glm::dvec3 eye : {glm::dvec3(-1.2, 0.3, 0.6), glm::dvec3(-2, 1.5, 0.1), glm::dvec3(-7, -1, 2)}) {
+        const SelectionView view = viewFrom(eye, 0.7);
+        const Selection selection = in.select(view);
+        EXPECT_TRUE(selection.complete);
+        EXPECT_LE(selection.errorPixels, 0.7);
+        // With whole pages more is read.
+        EXPECT_LE(selection.wanted.size(), Input(fullTree(5, 0.01)).select(view).wanted.size());
+    }
+}
+
 /// The full tree, whose slabs' colours are off by so much (a code of colourErrorOf), but those of the finest pages.
 Dataset colouredTree(uint32_t levels, double error, uint8_t code) {
     Dataset dataset = fullTree(levels, error);
