@@ -16,7 +16,7 @@ namespace {
 using glm::dvec2, glm::dvec3, std::numbers::pi;
 
 constexpr int kShadowRays = 2;
-constexpr double kLift = 1e-4;  // by which shadow rays start above a hit, tile units
+constexpr double kShadowLift = 1e-4;  // by which shadow rays start above a hit, tile units
 using NineHarmonics = std::array<double, 9>;
 
 /// Real spherical harmonics of bands 0 to 2: 1; x, y, z; xy, yz, xz, 3 z^2 - 1; x^2 - y^2.
@@ -63,7 +63,7 @@ public:
     }
     [[nodiscard]] bool isLit(const Seen& seen, dvec3 light) const {
         if (light.z <= 0) return false;
-        const dvec3 d = inTile(light), origin = seen.at + kLift * seen.normal;
+        const dvec3 d = inTile(light), origin = seen.at + kShadowLift * seen.normal;
         return origin.z >= extent_.z || !shape_.trace(origin, d, (extent_.z - origin.z) / d.z).hit;
     }
 

@@ -242,7 +242,7 @@ bool readChunk(ChunkKind kind, In& in, Asset& a) {
             a.heights.emplace();
             a.heights->size = in.one<glm::ivec2>(), a.heights->range = in.one<double>();
             const glm::ivec2 size = a.heights->size;
-            in.require(size.x >= 1 && size.y >= 1 && size.x <= kMaxGridEdge && size.y <= kMaxGridEdge &&
+            in.require(size.x >= 1 && size.y >= 1 && size.x <= kMaxMapEdge && size.y <= kMaxMapEdge &&
                        a.heights->extent() == extent);
             a.heights->texels = in.all<uint16_t>(in.ok() ? uint64_t(size.x) * uint64_t(size.y) : 0);
             break;

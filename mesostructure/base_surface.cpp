@@ -11,36 +11,17 @@
 #include <fmt/ranges.h>
 #include <glm/geometric.hpp>
 
+#include "mesostructure/base_sheet.h"
+#include "mesostructure/base_tubes.h"
+
 namespace vcp::meso {
 
 namespace {
 
 using glm::dvec2, glm::dvec3, std::numbers::pi;
 
-constexpr std::array<std::string_view, 6> kSurfaceNames = {"quad", "box", "cylinder", "sphere", "torus", "teapot"};
-
-/// Adds a grid of columns x rows cells over [0, 1]^2. `uv` maps the parameters to tiles.
-void addSheet(BaseSurface& to, int columns, int rows, const std::function<dvec3(double, double)>& at,
-              const std::function<dvec2(double, double)>& uv) {
-    const auto first = uint32_t(to.positions.size());
-    const auto parameter = [](int i, int n) { return double(i) / n; };
-    for (int j = 0; j <= rows; ++j)
-        for (int i = 0; i <= columns; ++i) to.positions.push_back(at(parameter(i, columns), parameter(j, rows)));
-    const auto add = [&](std::array<glm::ivec2, 3> corners) {
-        std::array<uint32_t, 3> triangle;
-        std::array<dvec2, 3> map;
-        for (int k = 0; k < 3; ++k) {
-            triangle[k] = first + uint32_t(corners[k].x + (columns + 1) * corners[k].y);
-            map[k] = uv(parameter(corners[k].x, columns), parameter(corners[k].y, rows));
-        }
-        to.triangles.push_back(triangle), to.uvs.push_back(map);
-    };
-    for (int j = 0; j < rows; ++j)
-        for (int i = 0; i < columns; ++i) {
-            add({glm::ivec2(i, j), glm::ivec2(i + 1, j), glm::ivec2(i + 1, j + 1)});
-            add({glm::ivec2(i, j), glm::ivec2(i + 1, j + 1), glm::ivec2(i, j + 1)});
-        }
-}
+constexpr std::array<std::string_view, 10> kSurfaceNames = {"quad",   "box",  "cylinder", "sphere",   "torus",
+                                                            "teapot", "vase", "bird",     "dinosaur", "tree"};
 
 /// Makes the six sides of a cube, or of the sphere about it by equal angles.
 BaseSurface cube(int cells, bool isSphere, double tiles) {
@@ -79,16 +60,11 @@ BaseSurface cylinder(double tiles) {
     return made;
 }
 
-BaseSurface torus(double tiles) {
-    BaseSurface made;
-    addSheet(
-        made, 96, 40,
-        [](double u, double v) {
-            const double r = 1 + 0.45 * std::cos(2 * pi * v);
-            return dvec3(r * std::cos(2 * pi * u), r * std::sin(2 * pi * u), 0.45 * std::sin(2 * pi * v));
-        },
-        [&](double u, double v) { return tiles * dvec2(3 * u, v); });
-    return made;
+/// Joins corners that are one but for their last bits, as the two ends of a turn are.
+void joinRounded(BaseSurface& surface) {
+    for (dvec3& p : surface.positions)
+        for (int axis = 0; axis < 3; ++axis) p[axis] = std::round(p[axis] * 0x1p40) * 0x1p-40;
+    joinPositions(surface);
 }
 
 template <class Point>
@@ -163,6 +139,18 @@ void addTube(BaseSurface& to, std::span<const BicubicPatch> patches, double tile
     }
 }
 
+/// Leaves out triangles two of whose corners are one, as there are at poles.
+void leaveOutPoints(BaseSurface& surface) {
+    size_t kept = 0;
+    for (size_t i = 0; i < surface.triangles.size(); ++i) {
+        const auto t = surface.triangles[i];
+        if (t[0] == t[1] || t[1] == t[2] || t[2] == t[0]) continue;
+        surface.triangles[kept] = t, surface.uvs[kept] = surface.uvs[i];
+        ++kept;
+    }
+    surface.triangles.resize(kept), surface.uvs.resize(kept);
+}
+
 }  // namespace
 
 std::span<const std::string_view> baseSurfaceNames() { return kSurfaceNames; }
@@ -183,18 +171,31 @@ Result<BaseSurface> makeBaseSurface(std::string_view name, double tiles) {
     else if (name == "cylinder")
         made = cylinder(tiles);
     else if (name == "torus")
-        made = torus(tiles);
+        return torusSurface(tiles, {96, 40});
     else if (name == "teapot")
         addRound(made, kBody, tiles), addRound(made, kLid, tiles), addTube(made, kHandle, tiles),
             addTube(made, kSpout, tiles);
+    else if (auto tubes = makeTubes(name, tiles))
+        made = *std::move(tubes);
     else
         return Error{.code = ErrorCode::Usage,
                      .message = fmt::format("there is no base surface \"{}\"; there are {}", name,
                                             fmt::join(kSurfaceNames, ", "))};
-    // The two ends of a turn would differ in their last bits.
-    for (dvec3& p : made.positions)
-        for (int axis = 0; axis < 3; ++axis) p[axis] = std::round(p[axis] * 0x1p40) * 0x1p-40;
-    joinPositions(made);
+    joinRounded(made);
+    leaveOutPoints(made);
+    return made;
+}
+
+BaseSurface torusSurface(double tiles, glm::ivec2 cells) {
+    BaseSurface made;
+    addSheet(
+        made, cells.x, cells.y,
+        [](double u, double v) {
+            const double r = 1 + kTorusTube * std::cos(2 * pi * v);
+            return dvec3(r * std::cos(2 * pi * u), r * std::sin(2 * pi * u), kTorusTube * std::sin(2 * pi * v));
+        },
+        [&](double u, double v) { return tiles * dvec2(kTorusRingTiles * u, v); });
+    joinRounded(made);
     return made;
 }
 

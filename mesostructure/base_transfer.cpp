@@ -21,6 +21,8 @@ using Row = std::array<double, 16>;
 constexpr double kBaseLift = 1e-6;      // by which rays start above a base, parts of the scene's diagonal
 constexpr double kSteadiness = 1e-5;    // that is added to the least squares' diagonal, whose largest is near 0.1
 constexpr double kBounceIsOver = 1e-4;  // of what a white surface gives back, at most, by one more bounce
+// How much of the whole is done when all rays are cast, and when all bounces are followed.
+constexpr double kAfterRays = 0.6, kAfterBounces = 0.75;
 
 /// Weighs the rays over a hemisphere so that sums of what they bring are coefficients (the inverse of the harmonics'
 /// products over the rays, by Cholesky's decomposition).
@@ -90,23 +92,30 @@ public:
         std::copy(open.c, open.c + 16, own_[vertex].begin());
     }
 
-    /// Follows light from base to base; then `lit` is what each vertex gets, over what falls on an open one.
-    void bounce() {
+    /// Follows light from base to base; then `lit` is what each vertex gets, over what falls on an open one. Returns
+    /// false where it was cancelled. `share`: calls for all vertices.
+    template <class Share>
+    bool bounce(const Share& share) {
         lit_ = own_;
         for (uint32_t i = 0; i < options_.bounces; ++i) {
             std::vector<Row> next = own_;
+            const bool isDone = share(
+                [&](size_t v) {
+                    for (const Blocked& blocked : blocked_[v]) {
+                        const Row from = givenBack(blocked);
+                        for (size_t k = 0; k < 16; ++k) next[v][k] += from[k] / options_.rays;
+                    }
+                },
+                i);
+            if (!isDone) return false;
+            // Under light of radiance 1 from everywhere.
             double most = 0;
-            for (size_t v = 0; v < next.size(); ++v) {
-                for (const Blocked& blocked : blocked_[v]) {
-                    const Row from = givenBack(blocked);
-                    for (size_t k = 0; k < 16; ++k) next[v][k] += from[k] / options_.rays;
-                }
-                // Under light of radiance 1 from everywhere.
+            for (size_t v = 0; v < next.size(); ++v)
                 most = std::max(most, std::abs(next[v][0] - lit_[v][0]) / f64::kBand0);
-            }
             lit_ = std::move(next);
             if (most < kBounceIsOver) break;
         }
+        return true;
     }
 
     /// Returns M less the identity. Precondition: bounce().
@@ -239,27 +248,34 @@ Result<std::vector<BaseTransfer>> traceBaseTransfer(const BaseScene& scene,
                                    "coarser bases",
                                    scene.positions.size(), scene.positions.size() * most, options.memoryBytes)};
     BaseTracer tracer(scene, options);
-    const auto share = [&](const std::function<void(size_t, size_t)>& fill) {
-        if (options.shareOut) return options.shareOut(scene.positions.size(), fill);
-        fill(0, scene.positions.size());
+    const auto share = [&](size_t count, const auto& each, BaseTransferOptions::Part part) {
+        const auto fill = [&](size_t first, size_t last) {
+            for (size_t i = first; i < last; ++i) each(i);
+        };
+        if (options.shareOut) return options.shareOut(count, fill, part);
+        fill(0, count);
         return true;
     };
-    const bool isCast = share([&](size_t first, size_t last) {
-        for (size_t v = first; v < last; ++v) tracer.cast(v);
-    });
-    if (!isCast) return Error::cancelled();
-    tracer.bounce();
+    const size_t vertices = scene.positions.size();
+    if (!share(vertices, [&](size_t v) { tracer.cast(v); }, {0, kAfterRays})) return Error::cancelled();
+    const auto bounce = [&](const auto& each, uint32_t number) {
+        const double step = (kAfterBounces - kAfterRays) / options.bounces;
+        return share(vertices, each, {kAfterRays + number * step, kAfterRays + (number + 1) * step});
+    };
+    if (!tracer.bounce(bounce)) return Error::cancelled();
     std::vector<BaseTransfer> made;
+    std::vector<std::pair<uint32_t, float*>> changed;  // vertices, and where their change goes
     for (const auto& [first, count] : ranges) {
         BaseTransfer& transfer = made.emplace_back();
-        for (uint32_t v = first; v < first + count; ++v) {
-            transfer.numbers.push_back(0);
-            if (tracer.isOpen(v)) continue;
-            const auto change = tracer.changeAt(v);
-            transfer.changes.insert(transfer.changes.end(), change.begin(), change.end());
-            transfer.numbers.back() = uint32_t(transfer.changes.size() / BaseTransfer::kValues);
-        }
+        uint32_t number = 0;
+        for (uint32_t v = first; v < first + count; ++v) transfer.numbers.push_back(tracer.isOpen(v) ? 0 : ++number);
+        transfer.changes.resize(BaseTransfer::kValues * number);
+        for (uint32_t v = first; v < first + count; ++v)
+            if (const uint32_t at = transfer.numbers[v - first]; at > 0)
+                changed.emplace_back(v, &transfer.changes[BaseTransfer::kValues * (at - 1)]);
     }
+    const auto change = [&](size_t i) { std::ranges::copy(tracer.changeAt(changed[i].first), changed[i].second); };
+    if (!share(changed.size(), change, {kAfterBounces, 1})) return Error::cancelled();
     return made;
 }
 

@@ -76,8 +76,13 @@ struct BaseTransferOptions {
     uint64_t memoryBytes = uint64_t{1} << 30;
     /// Returns the first hit of a ray; called from several threads at once.
     std::function<std::optional<BaseHit>(glm::dvec3 origin, glm::dvec3 direction)> cast = {};
-    /// As TransferOptions::shareOut.
-    std::function<bool(size_t count, const std::function<void(size_t first, size_t last)>& fill)> shareOut = {};
+    /// As TransferOptions::shareOut, once for the rays, for each bounce and for what comes of them: `part` is how much
+    /// of the whole is done before it and after it.
+    struct Part {
+        double before = 0, after = 1;
+    };
+    std::function<bool(size_t count, const std::function<void(size_t first, size_t last)>& fill, Part part)> shareOut =
+        {};
 };
 
 /// Traces the transfer of `ranges` of vertices (first, count). The same scene and options give the same bits, in any

@@ -145,10 +145,10 @@ std::span<const std::string_view> heightFieldNames() { return kHeightFieldNames;
 Result<HeightMap> makeHeightField(std::string_view name, int texels, uint32_t seed) {
     if (std::ranges::find(kHeightFieldNames, name) == kHeightFieldNames.end())
         return Error{.code = ErrorCode::Usage, .message = fmt::format("there is no height field \"{}\"", name)};
-    if (texels < 8 || texels > kMaxGridEdge)
+    if (texels < 8 || texels > kMaxMapEdge)
         return Error{
             .code = ErrorCode::Usage,
-            .message = fmt::format("a height field of {} texels; it must be from 8 to {}", texels, kMaxGridEdge)};
+            .message = fmt::format("a height field of {} texels; it must be from 8 to {}", texels, kMaxMapEdge)};
     HeightMap map{{texels, texels}, 0.15, std::vector<uint16_t>(size_t(texels) * size_t(texels))};
     if (name == "maze") map.range = 0.06, carveMaze(map, seed);
     if (name == "needle") map.texels[size_t(texels / 2) * texels + texels / 2] = 65535;

@@ -129,10 +129,14 @@ private:
 }  // namespace
 
 Result<std::unique_ptr<Shape>> heightShape(const HeightMap& map) {
-    if (map.size.x < 1 || map.size.y < 1 || map.size.x > kMaxGridEdge || map.size.y > kMaxGridEdge ||
-        map.texels.size() != size_t(map.size.x) * size_t(map.size.y))
-        return Error{.message = fmt::format("a height map of {} x {} texels; each edge must be from 1 to {}",
+    if (map.size.x > kMaxGridEdge || map.size.y > kMaxGridEdge)
+        return Error{.code = ErrorCode::Limit,
+                     .message = fmt::format("a height map of {} x {} texels: rays are marched over at most {} along an "
+                                            "edge; larger maps are for the method remesh, with heights alone",
                                             map.size.x, map.size.y, kMaxGridEdge)};
+    if (map.size.x < 1 || map.size.y < 1 || map.texels.size() != size_t(map.size.x) * size_t(map.size.y))
+        return Error{.message = fmt::format("a height map of {} x {} texels with {} heights", map.size.x, map.size.y,
+                                            map.texels.size())};
     if (!(map.range > 0) || !std::isfinite(map.range))
         return Error{.message = "the range of the heights must be above 0"};
     return std::unique_ptr<Shape>(std::make_unique<HeightShape>(map));

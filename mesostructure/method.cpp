@@ -11,7 +11,7 @@ namespace vcp::meso {
 
 namespace {
 
-constexpr std::array<std::string_view, 18> kMethodNames = {"relief-linear",
+constexpr std::array<std::string_view, 21> kMethodNames = {"relief-linear",
                                                            "relief-binary",
                                                            "relief-secant",
                                                            "relief-secant-printed",
@@ -22,6 +22,9 @@ constexpr std::array<std::string_view, 18> kMethodNames = {"relief-linear",
                                                            "ddm",
                                                            "ddm-quadric",
                                                            "ddm-quadric-fitted",
+                                                           "ddm-compressed",
+                                                           "ddm-cells",
+                                                           "quadric",
                                                            "boxes",
                                                            "cells",
                                                            "gdm",
@@ -169,8 +172,10 @@ bool methodFits(std::string_view name, const Asset& asset) {
 }
 
 GdmOptions tracedBy(const Shape& shape, const MethodOptions& options) {
-    return {
-        .points = pointsOf(shape.extent(), options), .directions = options.directions, .ofTop = options.name == "vdm"};
+    GdmOptions traced;
+    traced.points = pointsOf(shape.extent(), options), traced.directions = options.directions;
+    traced.ofTop = options.name == "vdm", traced.shareOut = options.shareOut;
+    return traced;
 }
 
 Result<Method> buildMethod(const Asset& asset, const Shape& shape, const MethodOptions& options) {
@@ -201,7 +206,8 @@ Result<Method> buildMethod(const Asset& asset, const Shape& shape, const MethodO
     }
     if (name == "gdm" || name == "gdm-visibility" || name == "vdm") return displacementMethod(asset, shape, options);
     const glm::ivec3 cells = cellsOf(asset, shape.extent(), options.cells);
-    const bool withBoxes = name == "boxes" || name == "gdm-safe", isExact = withBoxes || name == "cells";
+    const bool withBoxes = name == "boxes" || name == "gdm-safe",
+               isExact = withBoxes || name == "cells" || name == "ddm-cells";
     if (isExact && asset.heights && (asset.heights->size.x % cells.x != 0 || asset.heights->size.y % cells.y != 0))
         return Error{.code = ErrorCode::Usage,
                      .message = fmt::format("a grid of {} x {} cells does not divide the height map's {} x {} texels",
@@ -224,20 +230,28 @@ Result<Method> buildMethod(const Asset& asset, const Shape& shape, const MethodO
         else
             VCP_TRY(take(buildGuesses(*method.occupancy, options.guesses), method.guesses));
     }
-    if (isExact) return method;
+    if (withBoxes || name == "cells") return method;
+    const auto addPatches = [&](CrossingRule rule) {
+        return take(buildPatches(shape, *method.occupancy, rule), method.patches);
+    };
+    if (name == "quadric") {
+        VCP_TRY(addPatches(CrossingRule::Direct));
+        return method;
+    }
     const Cones cones = name == "dm" ? Cones{1, 1} : options.cones;
     const double cap = options.cap > 0 ? options.cap : cones.areSigns() ? 0.25 : 0.125;
     if (isOwn && asset.distances && asset.distances->cones.azimuth == cones.azimuth &&
-        asset.distances->cones.elevation == cones.elevation && options.cap <= 0)
+        asset.distances->cones.elevation == cones.elevation && options.cap <= 0 &&
+        options.distances == DistanceRule::AnyPoint)
         method.distances = std::make_unique<DistanceMap>(*asset.distances);
     else
-        VCP_TRY(take(buildDistanceMap(*method.occupancy, {.cones = cones, .cap = cap}), method.distances));
-    if (name.starts_with("ddm-quadric")) {
-        VCP_TRY(take(
-            buildPatches(shape, *method.occupancy, name == "ddm-quadric" ? CrossingRule::Direct : CrossingRule::Fitted),
-            method.patches));
+        VCP_TRY(
+            take(buildDistanceMap(*method.occupancy, {.cones = cones, .rule = options.distances, .cap = cap}, &shape),
+                 method.distances));
+    const bool isQuadric = name.starts_with("ddm-quadric");
+    if (isQuadric) VCP_TRY(addPatches(name == "ddm-quadric" ? CrossingRule::Direct : CrossingRule::Fitted));
+    if (isQuadric || name == "ddm-compressed")
         VCP_TRY(take(compressMap(*method.distances, std::array{4}), method.compressed));
-    }
     return method;
 }
 

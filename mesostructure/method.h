@@ -2,6 +2,7 @@
 // shaders are made from the same arrays (march_arrays.h).
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <span>
 #include <string>
@@ -45,7 +46,7 @@ struct Method {
 struct MethodOptions {
     std::string name = "boxes";
     int cells = 0;      ///< cells of the grid, or points of a map, along x; 0: the asset's own grid, or 64; points 32
-    Cones cones{4, 1};  ///< cones of ddm, ddm-quadric and ddm-quadric-fitted
+    Cones cones{4, 1};  ///< cones of all ddm
     int steps = 32;     ///< steps of relief mapping
     int refinements = 10;
     float tolerance = ReliefOptions().tolerance;
@@ -54,14 +55,19 @@ struct MethodOptions {
     glm::ivec2 directions{16, 32};         ///< theirs: elevations over the sphere (vdm: over its lower half), azimuths
     int layers = 0;                        ///< points along z of a map or of slices; 0: as far apart as along x
     const DistanceTable* table = nullptr;  ///< traced already by tracedBy of these options; null: it is traced
-    SafeOptions guesses = {};              ///< of gdm-safe
-    int mostGuesses = 1;                   ///< of a ray of gdm-safe
-    double cap = 0;  ///< longest distance of dm, ddm, ddm-quadric and ddm-quadric-fitted, tiles; 0: 1/4, or 1/8
+    /// As GdmOptions::shareOut, of that tracing.
+    std::function<bool(size_t count, const std::function<void(size_t first, size_t last)>& fill)> shareOut = {};
+    SafeOptions guesses = {};                         ///< of gdm-safe
+    int mostGuesses = 1;                              ///< of a ray of gdm-safe
+    double cap = 0;                                   ///< longest distance of dm and of all ddm, tiles; 0: 1/4, or 1/8
+    DistanceRule distances = DistanceRule::AnyPoint;  ///< of dm and of all ddm
 };
 
 /// The names for height fields only: "relief-linear", "relief-binary", "relief-secant", "relief-secant-printed",
-/// "relief-illinois", "pyramid". For all: "sphere", "dm", "ddm", "ddm-quadric", "ddm-quadric-fitted", "boxes", "cells",
-/// "gdm", "gdm-visibility", "gdm-safe", "vdm", "slices".
+/// "relief-illinois", "pyramid". For all: "sphere", "dm", "ddm", "ddm-quadric", "ddm-quadric-fitted", "ddm-compressed",
+/// "ddm-cells", "quadric", "boxes", "cells", "gdm", "gdm-visibility", "gdm-safe", "vdm", "slices". Beside
+/// "ddm-quadric", which is compressed, "ddm-compressed" has no quadrics, "quadric" steps from cell to cell, and
+/// "ddm-cells" has the exact cells of "boxes" under the distances of "ddm".
 std::span<const std::string_view> methodNames();
 /// Whether a method of that name marches the asset: some march only height fields.
 bool methodFits(std::string_view name, const Asset& asset);

@@ -43,6 +43,9 @@ private:
     glm::dvec3 extent_;
 };
 
+/// Most texels along an edge of a height map. Rays are marched over maps of kMaxGridEdge; larger ones are remeshed.
+inline constexpr int kMaxMapEdge = 16384;
+
 /// Heights on a grid of texels, periodic, bilinear between them. Texel (i, j) lies at the grid point (i, j) / size, and
 /// its height is value / 65535 * range.
 struct HeightMap {
@@ -59,7 +62,8 @@ struct HeightMap {
 
 using TileTriangle = std::array<glm::dvec3, 3>;  ///< tile space; it may reach into neighbouring tiles
 
-/// Errors of all three functions: InvalidInput, without a file. The height map must outlive its shape.
+/// Errors of all three functions: InvalidInput, without a file; Limit for a height map of more than kMaxGridEdge texels
+/// along an edge. The height map must outlive its shape.
 Result<std::unique_ptr<Shape>> heightShape(const HeightMap& map);
 /// mesostructure/solids.h lists the names.
 Result<std::unique_ptr<Shape>> solidShape(const std::string& name, uint32_t seed);

@@ -19,6 +19,9 @@ using glm::dvec2, glm::dvec3;
 
 constexpr size_t kMostPieces = size_t{1} << 24;  // numbers of pieces are stored as floats
 constexpr double kLongest = 3;                   // longest direction at an edge, in heights
+constexpr double kLeastVolume = 0.02;            // of a piece, of that over a flat triangle; else columns are cut
+constexpr double kLeastReach = 1.0 / 64;         // of a column, of the shell's height
+constexpr int kMostRounds = 16;                  // in which columns are cut, each round for what the last one changed
 
 using Piece = ShellPiece;
 
@@ -79,9 +82,13 @@ public:
           height_(height),
           tileHeight_(extent.z),
           offset_(offset),
-          shell_(shell) {}
+          shell_(shell),
+          reaches_(surface.positions.size(), 1) {}
 
     std::vector<Piece> all() {
+        for (int round = 0; round < kMostRounds && cutColumns(); ++round) {
+        }
+        shell_.cut = uint64_t(std::ranges::count_if(reaches_, [](double reach) { return reach < 1; }));
         std::vector<Piece> pieces;
         for (size_t i = 0; i < surface_.triangles.size(); ++i) addPrism(i, pieces);
         return pieces;
@@ -99,15 +106,14 @@ private:
         const double area = a.x * b.y - a.y * b.x;
         shell_.withoutMap += std::abs(area) <= 1e-12 * (glm::dot(a, a) + glm::dot(b, b));
         shell_.mirrored += area < 0;
-        std::array<int, 3> order = {0, 1, 2};
-        std::ranges::sort(order, {}, [&](int k) { return t[k]; });
-        const bool isOdd = (order[1] - order[0] + 3) % 3 != 1;
-        std::array<dvec3, 6> world, tile;  // base, then top, by number
+        const Prism prism = prismOf(triangle, 1);
+        const std::array<int, 3>& order = prism.order;
+        bool isTopCut = false;
+        std::array<dvec3, 6> tile;  // as Prism::world
         for (int k = 0; k < 3; ++k) {
-            world[k] = surface_.positions[t[order[k]]] - shell_.origin;
-            if (offset_ != 0) world[k] += offset_ * directions_[t[order[k]]];
-            world[k + 3] = world[k] + height_ * directions_[t[order[k]]];
-            tile[k] = dvec3(map[order[k]], 0), tile[k + 3] = dvec3(map[order[k]], tileHeight_);
+            const double reach = reaches_[t[order[k]]];
+            isTopCut |= reach < 1;
+            tile[k] = dvec3(map[order[k]], 0), tile[k + 3] = dvec3(map[order[k]], reach * tileHeight_);
         }
         // The sides, by the column that they are opposite to.
         std::array<bool, 3> isCut{};
@@ -118,13 +124,14 @@ private:
         for (int piece = 0; piece < 3; ++piece) {
             Piece made;
             for (int k = 0; k < 4; ++k)
-                made.corners[k] = world[kCorners[piece][k]], made.tile[k] = tile[kCorners[piece][k]];
+                made.corners[k] = prism.world[kCorners[piece][k]], made.tile[k] = tile[kCorners[piece][k]];
             made.bits = bitsOf(kCorners[piece], isCut) | uint32_t(piece) << f32::kShellPart;
+            if (isTopCut && kCorners[piece][1] == 3) made.bits |= 1;  // the top is opposite to its first corner
             for (int k = 0; k < 3; ++k) made.columns[k] = t[order[k]];
-            const dvec3 x = made.corners[1] - made.corners[0], y = made.corners[2] - made.corners[0],
-                        z = made.corners[3] - made.corners[0];
-            const double volume = glm::dot(glm::cross(x, y), z) * (isOdd ? -1 : 1) * (piece == 1 ? -1 : 1);
-            const double scale = glm::length(x) * glm::length(y) * glm::length(z);
+            const double volume = prism.volume(piece);
+            const double scale = glm::distance(made.corners[1], made.corners[0]) *
+                                 glm::distance(made.corners[2], made.corners[0]) *
+                                 glm::distance(made.corners[3], made.corners[0]);
             shell_.inverted += volume < 0;
             if (std::abs(volume) > 1e-12 * scale)
                 pieces.push_back(made);
@@ -135,6 +142,70 @@ private:
 
     /// The corners of the prism: base, then top; column i is corners i and i + 3.
     static constexpr int kCorners[3][4] = {{0, 1, 2, 5}, {0, 1, 4, 5}, {0, 3, 4, 5}};
+
+    struct Prism {
+        std::array<int, 3> order = {0, 1, 2};  ///< the triangle's corners, by number
+        std::array<dvec3, 6> world;            ///< in this order
+        bool isOdd = false;
+
+        /// Returns six times the volume of a piece; below 0 where it is turned inside out.
+        [[nodiscard]] double volume(int piece) const {
+            const auto& c = kCorners[piece];
+            const dvec3 from = world[c[0]];
+            const double six = glm::dot(glm::cross(world[c[1]] - from, world[c[2]] - from), world[c[3]] - from);
+            return isOdd != (piece == 1) ? -six : six;
+        }
+    };
+
+    /// Returns the prism with a part of each column's reach.
+    [[nodiscard]] Prism prismOf(size_t triangle, double part) const {
+        const auto& t = surface_.triangles[triangle];
+        Prism made;
+        std::ranges::sort(made.order, {}, [&](int k) { return t[k]; });
+        made.isOdd = (made.order[1] - made.order[0] + 3) % 3 != 1;
+        for (int k = 0; k < 3; ++k) {
+            const uint32_t corner = t[made.order[k]];
+            made.world[k] = surface_.positions[corner] - shell_.origin;
+            if (offset_ != 0) made.world[k] += offset_ * directions_[corner];
+            made.world[k + 3] = made.world[k] + part * reaches_[corner] * height_ * directions_[corner];
+        }
+        return made;
+    }
+
+    /// Whether each piece of a prism with a part of its columns has some volume, the right way round.
+    [[nodiscard]] bool isSound(size_t triangle, double part) const {
+        const Prism prism = prismOf(triangle, part);
+        const double base = glm::length(glm::cross(prism.world[1] - prism.world[0], prism.world[2] - prism.world[0]));
+        for (int piece = 0; piece < 3; ++piece) {
+            // A piece has one of the columns.
+            const double reach = reaches_[surface_.triangles[triangle][prism.order[2 - piece]]];
+            if (prism.volume(piece) < kLeastVolume * base * part * reach * height_) return false;
+        }
+        return true;
+    }
+
+    /// Cuts the columns of prisms that would be turned inside out; what cannot be helped stays. Returns whether any was
+    /// cut.
+    bool cutColumns() {
+        bool any = false;
+        std::vector<double> next = reaches_;
+        for (size_t i = 0; i < surface_.triangles.size(); ++i) {
+            if (isSound(i, 1) || faceNormal(surface_, i) == dvec3(0)) continue;
+            double sound = 1;
+            while (sound >= kLeastReach && !isSound(i, sound)) sound /= 2;
+            if (sound < kLeastReach) continue;
+            double turned = 2 * sound;
+            for (int k = 0; k < 8; ++k) {
+                const double middle = (sound + turned) / 2;
+                (isSound(i, middle) ? sound : turned) = middle;
+            }
+            for (const uint32_t corner : surface_.triangles[i])
+                if (const double reach = reaches_[corner] * sound; reach >= kLeastReach)
+                    next[corner] = std::min(next[corner], reach), any = true;
+        }
+        reaches_ = std::move(next);
+        return any;
+    }
 
     static uint32_t bitsOf(const int (&corners)[4], const std::array<bool, 3>& isCut) {
         uint32_t bits = corners[2] < 3 ? Shell::kBase : 0;
@@ -154,6 +225,7 @@ private:
     Joins joins_;
     double height_, tileHeight_, offset_;
     Shell& shell_;
+    std::vector<double> reaches_;  // of the columns, parts of the height
 };
 
 /// Halves the pieces at the median of their middles, along the longest axis.

@@ -6,10 +6,14 @@
 // lower number, so both cut it alike and the shell has neither gap nor overlap. In a tetrahedron world space and tile
 // space are related linearly: straight rays stay straight, parameters scale.
 //
+// Where the surface is more sharply concave than the shell is high, columns would pass each other, and tetrahedra would
+// be turned inside out. There columns are cut, the tile's height with them: the mesostructure keeps its measure, the
+// shell ends lower, and what it ends in shows its cut.
+//
 // What a map or a surface may do to a shell is counted, not refused: triangles without area are left out; where the map
-// has no area (the texture is smeared along it); mirrored maps, which need nothing; tetrahedra that are turned inside
-// out, where the surface is more sharply concave than the shell is high, so that pieces overlap and the nearest wins;
-// tetrahedra without volume, which are left out: where faces lie on their own backs there is no outside.
+// has no area (the texture is smeared along it); mirrored maps, which need nothing; columns that are cut; tetrahedra
+// that are turned inside out whatever is cut, where a surface folds within a triangle: pieces overlap, and the nearest
+// wins; tetrahedra without volume, which are left out: where faces lie on their own backs there is no outside.
 #pragma once
 
 #include <array>
@@ -32,8 +36,9 @@ struct Shell {
     glm::dvec3 origin{0};        ///< what all coordinates are relative to: the middle of the base
     glm::dvec3 low{0}, high{0};  ///< box of the shell, world
     uint32_t nodes = 0, pieces = 0;
-    uint64_t withoutArea = 0, withoutMap = 0, mirrored = 0, inverted = 0,
-             flat = 0;  ///< triangles; the last two: pieces
+    uint64_t withoutArea = 0, withoutMap = 0, mirrored = 0;  ///< triangles
+    uint64_t cut = 0;                                        ///< columns
+    uint64_t inverted = 0, flat = 0;                         ///< pieces
 
     /// `nodes` nodes, then `pieces` tetrahedra, as shaders read them:
     ///   node    (low, first child or first piece) (high, pieces; 0: two children, one after the other)
@@ -42,7 +47,8 @@ struct Shell {
     ///           3 x (row of R, coordinate of q0)    weights of corners 1 to 3 are R (p - v0)
     ///           3 x (row of T, position's number)   tile space is q0 + T (p - v0); q0 is in the first tile; the
     ///           positions of its prism's columns
-    /// A face is cut where it is on a border of the base, or where the map jumps: solid shows its cut there.
+    /// A face is cut where it is on a border of the base, where the map jumps, or where it is the top over a column
+    /// that was cut: solid shows its cut there.
     static constexpr uint32_t kBase = f32::kShellBaseFace;
     std::vector<glm::vec4> texels;
 };

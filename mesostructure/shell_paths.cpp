@@ -14,9 +14,9 @@ namespace {
 using glm::dmat3, glm::dvec3, glm::dvec4;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kLift = 1e-6;     // by which rays start above a surface, parts of the scene's diagonal
-constexpr double kSlack = 1e-10;   // by which pieces are met wider than they are, in weights
-constexpr double kWithin = -1e-7;  // a field that is within the solid, tile units
+constexpr double kPathLift = 1e-6;  // by which rays start above a surface, parts of the scene's diagonal
+constexpr double kSlack = 1e-10;    // by which pieces are met wider than they are, in weights
+constexpr double kWithin = -1e-7;   // a field that is within the solid, tile units
 
 dmat3 edgesOf(const std::array<dvec3, 4>& c) { return {c[1] - c[0], c[2] - c[0], c[3] - c[0]}; }
 
@@ -40,7 +40,7 @@ ShellPaths::ShellPaths(const std::vector<Surface>& surfaces, double albedo) : al
     nodes_.push_back({dvec3(0), dvec3(0), 0, uint32_t(pieces_.size())});
     if (pieces_.empty()) return;
     split(0);
-    lift_ = kLift * glm::length(nodes_[0].high - nodes_[0].low);
+    lift_ = kPathLift * glm::length(nodes_[0].high - nodes_[0].low);
 }
 
 void ShellPaths::split(uint32_t node) {

@@ -12,7 +12,7 @@ namespace vcp::meso {
 
 /// Names: "fbm", "ridged", "hemispheres", "maze", "blocks", "bricks", "ripple", "needle", "edge", "bark", "cobble".
 std::span<const std::string_view> heightFieldNames();
-/// Makes a square map of `texels` an edge, from 8 to kMaxGridEdge. Errors: Usage (no such name, bad size).
+/// Makes a square map of `texels` an edge, from 8 to kMaxMapEdge. Errors: Usage (no such name, bad size).
 Result<HeightMap> makeHeightField(std::string_view name, int texels, uint32_t seed);
 
 /// The names are "bead", "beads", "ball", "chain", "weave", "bars", "scales", "kitten", "flakes", "gyroid", "sponge",

@@ -32,6 +32,10 @@ struct FrameStats {
         0;  ///< rays, of shadows too, that used up their iterations in mesostructure or went through too many pieces
     uint64_t farHits = 0;       ///< hits of pixels in surfaces, shown as seen from far and not marched
     uint64_t surfaceBytes = 0;  ///< bytes of mesostructure on the device, beside the pool: assets and shells
+    /// Pixels within which remeshed surfaces are certified to be, but for so many patches (meso::RemeshCounts); 0:
+    /// nothing is certified.
+    double remeshedPixels = 0;
+    uint64_t uncertifiedPatches = 0;
     /// This frame's submissions, with those that present it before it has ended, and how often the CPU waited for one.
     uint64_t submissions = 0, hostWaits = 0;
     bool onHost = false;          ///< the processor cast the rays itself, and no shader ran (RendererOptions::hostRays)

@@ -133,10 +133,10 @@ struct Patches {
     Result<void> create(const Device& on) {
         if (pipeline.exists()) return {};
         device = on.handle();
-        VkDescriptorSetLayoutBinding bindings[3];
-        for (uint32_t i = 0; i < 3; ++i) bindings[i] = {i, kTexels, 1, kPatchStages, nullptr};
+        VkDescriptorSetLayoutBinding bindings[2];
+        for (uint32_t i = 0; i < 2; ++i) bindings[i] = {i, kTexels, 1, kPatchStages, nullptr};
         VkDescriptorSetLayoutCreateInfo set{VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO};
-        set.bindingCount = 3;
+        set.bindingCount = 2;
         set.pBindings = bindings;
         VCP_VK(vkCreateDescriptorSetLayout, device, &set, nullptr, &setLayout);
         VCP_TRY_ASSIGN(pipeline,
@@ -153,14 +153,14 @@ struct Patches {
     Result<void> bind(const std::vector<RemeshSwept>& swept, const MesoTexels& levels) {
         sets.clear();
         for (const RemeshSwept& batch : swept) {
-            const VkDescriptorPoolSize size{kTexels, 3};
+            const VkDescriptorPoolSize size{kTexels, 2};
             VCP_TRY_ASSIGN(auto owner, allocateSet(device, setLayout, std::span(&size, 1)));
-            const VkBufferView views[] = {levels.view.handle(), levels.quads.handle(), batch.quadsView.handle()};
+            const VkBufferView views[] = {levels.quads.handle(), batch.quadsView.handle()};
             VkWriteDescriptorSet write{VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET};
             write.dstSet = owner.set;
             write.descriptorCount = 1;
             write.descriptorType = kTexels;
-            for (write.dstBinding = 0; write.dstBinding < 3; ++write.dstBinding) {
+            for (write.dstBinding = 0; write.dstBinding < 2; ++write.dstBinding) {
                 write.pTexelBufferView = &views[write.dstBinding];
                 vkUpdateDescriptorSets(device, 1, &write, 0, nullptr);
             }
@@ -262,7 +262,7 @@ Result<RemeshTimes> RemeshMeter::measure(meso::CertifiedCells& cells, const meso
 template <class Make>
 Result<RemeshTimes> RemeshMeter::timed(const meso::HeightLevels& heights, const Make& make, int rounds) {
     State& s = *state_;
-    VCP_TRY_ASSIGN(const auto levels, s.resources->words(meso::remeshLevelWords(heights)));
+    VCP_TRY_ASSIGN(const auto levels, s.resources->quads(meso::RemeshLevelBytes(heights).parts()));
     std::vector<double> pieces, sweeps, processor;
     for (int round = 0; round <= rounds; ++round) {
         const double start = processorMs();
@@ -295,7 +295,7 @@ Result<RemeshDrawn> RemeshMeter::draw(const meso::RemeshSurface& surface, const 
         return Error{.code = ErrorCode::Unsupported, .message = "'" + device().name + "' has no tessellator"};
     meso::RemeshOptions cut = options;
     if (!sweeps) cut.mostCells = std::min(options.mostCells, kMostTessellated);
-    VCP_TRY_ASSIGN(const auto levels, s.resources->words(meso::remeshLevelWords(*surface.heights)));
+    VCP_TRY_ASSIGN(const auto levels, s.resources->quads(meso::RemeshLevelBytes(*surface.heights).parts()));
     VCP_TRY(s.prepareTarget(width, height));
     VCP_TRY(meso::makeRemeshPieces(surface, camera, cut, s.pieces, s.pass->limits()));
     VCP_TRY(s.pass->prepare(s.swept, s.pieces, levels));

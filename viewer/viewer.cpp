@@ -58,6 +58,14 @@ bool sameView(const OrbitCamera& a, const OrbitCamera& b) {
 
 }  // namespace
 
+std::string remeshedText(const FrameStats& stats) {
+    if (stats.remeshedPixels == 0 && stats.uncertifiedPatches == 0) return {};
+    const std::string beyond = formatCount(stats.uncertifiedPatches, "patch", "patches") + " may be farther off";
+    if (stats.remeshedPixels == 0) return beyond;
+    const std::string within = "within " + formatPixels(stats.remeshedPixels) + " px";
+    return stats.uncertifiedPatches > 0 ? within + ", " + beyond : within;
+}
+
 std::string formatPixels(double pixels) {
     return pixels < 10 ? fmt::format("{:.2g}", pixels) : fmt::format("{:.0f}", pixels);
 }

@@ -110,6 +110,10 @@ struct ViewerStatus {
 /// Returns a text such as "0.46" or "510".
 std::string formatPixels(double pixels);
 
+/// Returns "within 0.5 px, 12 patches may be farther off" of a frame's remeshed surfaces; empty where nothing is
+/// certified.
+std::string remeshedText(const FrameStats& stats);
+
 /// Returns the status in one line of at most so many characters: less important parts are left out.
 std::string statusLine(const ViewerStatus& status, size_t most = std::numeric_limits<size_t>::max());
 

@@ -194,7 +194,7 @@ void CertifiedCells::limitSteps(const View& view, size_t patch, Seen& seen) cons
     seen.narrowest = std::min(stepOf(kNarrowestPixels), seen.widest);
 }
 
-void CertifiedCells::measure(size_t patch, Known& known, double enough) {
+void CertifiedCells::measure(size_t patch, Known& known, double enough, Scratch& scratch) const {
     // The sweep moves places as it moves directions; where these lie in the place of those, they come out as they are.
     RemeshPiece<double> piece;
     bool mayJump = false;
@@ -210,20 +210,20 @@ void CertifiedCells::measure(size_t patch, Known& known, double enough) {
             piece.seams[k] = {true, dvec2(patches_.seamUvs[seam][0]), dvec2(patches_.seamUvs[seam][1])};
     }
     piece.parts = known.cells.parts;
-    swept_.clear();
+    scratch.clear();
     const RemeshMath<double>::RemeshView flat{{1, 1, 1, 1}, 0, RemeshMath<double>::kRemeshMap};
-    PieceSweep<double> sweep(patches_, {}, flat, swept_);
+    PieceSweep<double> sweep(patches_, {}, flat, scratch);
     sweep.sweep(piece, {});
     double height = 0, across = 0, jump = 0;
     known.isWhole = true;
-    for (size_t i = 0; i < swept_.indices.size() && known.isWhole; i += 3) {
+    for (size_t i = 0; i < scratch.indices.size() && known.isWhole; i += 3) {
         std::array<HeightCorner, 3> at;
         std::array<dvec3, 3> directions;
         double least = kNothing, most = -kNothing;
         for (size_t k = 0; k < 3; ++k) {
-            const uint32_t number = swept_.indices[i + k];
-            at[k] = {swept_.vertices[number].uv, sweep.heights()[number]};
-            directions[k] = swept_.vertices[number].position;
+            const uint32_t number = scratch.indices[i + k];
+            at[k] = {scratch.vertices[number].uv, sweep.heights()[number]};
+            directions[k] = scratch.vertices[number].position;
             least = std::min(least, at[k].height), most = std::max(most, at[k].height);
             if (!mayJump) continue;
             const double own = patches_.heights->height(0, at[k].at);
@@ -241,7 +241,8 @@ void CertifiedCells::measure(size_t patch, Known& known, double enough) {
     known.across = std::nextafter(float(across), std::numeric_limits<float>::infinity());
 }
 
-CertifiedCells::Known& CertifiedCells::known(size_t patch, const Seen& seen, const PatchCells& cells, double allowed) {
+CertifiedCells::Known& CertifiedCells::known(size_t patch, const Seen& seen, const PatchCells& cells, double allowed,
+                                             Scratch& scratch) {
     auto& all = known_[patch];
     auto found = std::ranges::find(all, cells, &Known::cells);
     const bool isNew = found == all.end();
@@ -251,12 +252,12 @@ CertifiedCells::Known& CertifiedCells::known(size_t patch, const Seen& seen, con
     }
     // Above so much the error is more than is allowed, whatever else there is.
     const double enough = seen.perHeight > 0 ? 1.01 * allowed * seen.depth / seen.perHeight : kNothing;
-    if (isNew || (!found->isWhole && !(double(found->height) > enough))) measure(patch, *found, enough);
+    if (isNew || (!found->isWhole && !(double(found->height) > enough))) measure(patch, *found, enough, scratch);
     return *found;
 }
 
-bool CertifiedCells::keeps(size_t patch, const Seen& seen, const PatchCells& cells, double allowed) {
-    const Known& of = known(patch, seen, cells, allowed);
+bool CertifiedCells::keeps(size_t patch, const Seen& seen, const PatchCells& cells, double allowed, Scratch& scratch) {
+    const Known& of = known(patch, seen, cells, allowed, scratch);
     if (!of.isWhole) return false;
     const double height = double(of.height), jump = double(of.jump), across = double(of.across);
     if (pixels(seen, height + jump, across) <= allowed) return true;
@@ -264,9 +265,9 @@ bool CertifiedCells::keeps(size_t patch, const Seen& seen, const PatchCells& cel
     return cells.step <= seen.pixel && pixels(seen, jump, 0) > 0.5 * allowed && pixels(seen, height, across) <= allowed;
 }
 
-int CertifiedCells::wantedStep(size_t patch, Seen& seen, double allowed) {
+int CertifiedCells::wantedStep(size_t patch, Seen& seen, double allowed, Scratch& scratch) {
     for (int step = seen.widest; step >= seen.narrowest; --step)
-        if (seen.canKeep = keeps(patch, seen, evenly(patch, step), allowed); seen.canKeep) return step;
+        if (seen.canKeep = keeps(patch, seen, evenly(patch, step), allowed, scratch); seen.canKeep) return step;
     return std::clamp(std::min(seen.pixel, finest_), seen.narrowest, seen.widest);
 }
 
@@ -284,7 +285,7 @@ void CertifiedCells::refine(size_t patch, std::vector<uint32_t>& open) {
     }
 }
 
-void CertifiedCells::choose(const RemeshCamera& camera, const RemeshOptions& options, RemeshCounts& counts) {
+Result<void> CertifiedCells::choose(const RemeshCamera& camera, const RemeshOptions& options, RemeshCounts& counts) {
     const dvec4 s = camera.picture.value_or(camera.seen);
     const dvec2 farthest = glm::max(glm::abs(dvec2(s.x, s.y)), glm::abs(dvec2(s.z, s.w)));
     View view{camera, options.cell, s, std::sqrt(1 + glm::dot(farthest, farthest)), {}, {}};
@@ -295,14 +296,23 @@ void CertifiedCells::choose(const RemeshCamera& camera, const RemeshOptions& opt
     for (const glm::vec3& p : patches_.positions) view.positions.push_back(turned(from + dvec3(p)));
     for (const glm::vec3& d : patches_.directions) view.directions.push_back(turned(dvec3(d)));
 
-    seen_.resize(patches_.triangles.size());
+    seen_.resize(patches_.triangles.size()), wanted_.resize(seen_.size());
+    const auto wantSteps = [&](size_t first, size_t last) {
+        Scratch scratch;
+        for (size_t i = first; i < last; ++i) {
+            seen_[i] = seenIn(view, i);
+            if (seen_[i].is) wanted_[i] = wantedStep(i, seen_[i], options.errorPixels, scratch);
+        }
+    };
+    if (!options.shareOut)
+        wantSteps(0, seen_.size());
+    else if (!options.shareOut(seen_.size(), wantSteps))
+        return Error::cancelled();
     std::ranges::fill(edgeSteps_, coarsest_);
     std::vector<uint32_t> open;
     for (uint32_t i = 0; i < seen_.size(); ++i) {
-        seen_[i] = seenIn(view, i);
         if (!seen_[i].is) continue;
-        const int step = wantedStep(i, seen_[i], options.errorPixels);
-        for (const uint32_t edge : edges_[i]) edgeSteps_[edge] = std::min(edgeSteps_[edge], step);
+        for (const uint32_t edge : edges_[i]) edgeSteps_[edge] = std::min(edgeSteps_[edge], wanted_[i]);
         if (seen_[i].canKeep) open.push_back(i);
     }
     // What a patch wants it may have; but its cells are as fine as the finest of its edges, and these as coarse as
@@ -310,17 +320,18 @@ void CertifiedCells::choose(const RemeshCamera& camera, const RemeshOptions& opt
     while (!open.empty()) {
         const uint32_t patch = open.back();
         open.pop_back();
-        if (!keeps(patch, seen_[patch], cells(patch), options.errorPixels)) refine(patch, open);
+        if (!keeps(patch, seen_[patch], cells(patch), options.errorPixels, scratch_)) refine(patch, open);
     }
     for (uint32_t i = 0; i < seen_.size(); ++i) {
         if (!seen_[i].is) continue;
-        const Known& of = known(i, seen_[i], cells(i), options.errorPixels);
+        const Known& of = known(i, seen_[i], cells(i), options.errorPixels, scratch_);
         const double error = pixels(seen_[i], double(of.height) + double(of.jump), double(of.across));
         if (of.isWhole && error <= options.errorPixels)
             counts.boundPixels = std::max(counts.boundPixels, error);
         else
             ++counts.uncertified;
     }
+    return {};
 }
 
 template <class Real>
@@ -329,7 +340,7 @@ Result<void> remesh(CertifiedCells& cells, const RemeshCamera& camera, const Rem
     VCP_TRY(checkRemeshing(options));
     RemeshOptions ofMap = options;
     ofMap.access = HeightAccess::Map, ofMap.bounds = false;
-    cells.choose(camera, options, mesh.counts);
+    VCP_TRY(cells.choose(camera, options, mesh.counts));
     PieceSweep<Real> sweep(cells.patches(), ofMap, remeshViewOf<Real>(camera, ofMap), mesh);
     PieceMaker<Real> maker(cells.patches(), camera, ofMap, mesh.counts, &cells);
     return maker.run([&](const RemeshPiece<Real>& piece, const RemeshFrame<Real>& frame) -> Result<void> {

@@ -17,7 +17,7 @@
 // What is not certified: the rounding of single precision; what is nearer to the eye than the patch's own size; what
 // would take cells narrower than half a pixel; and where the map jumps along an edge, the slope from the higher side's
 // heights down to the lower side, within cells beside the edge that are at most options.cell pixels wide.
-// RemeshCounts::uncertified counts the patches of the last three. One thread at a time.
+// RemeshCounts::uncertified counts the patches of the last three. One thread at a time calls.
 #pragma once
 
 #include <array>
@@ -47,7 +47,8 @@ public:
 
     /// Chooses the cells of a view: errors of at most options.errorPixels on the screen, where the finest cells can,
     /// and none wider than options.cell pixels, or a texel where that is wider. Fills in boundPixels and uncertified.
-    void choose(const RemeshCamera& camera, const RemeshOptions& options, RemeshCounts& counts);
+    /// What was measured until options.shareOut cancels stays known. Errors: Cancelled.
+    Result<void> choose(const RemeshCamera& camera, const RemeshOptions& options, RemeshCounts& counts);
 
     /// The surface, each triangle a patch.
     [[nodiscard]] const RemeshSurface& patches() const { return patches_; }
@@ -73,6 +74,7 @@ private:
         double perHeight = 0, perUnit = 0, depth = 1, nearer = 0;
     };
     struct View;
+    using Scratch = RemeshMesh<double>;  ///< what a thread sweeps into
 
     void addEdges();
     void measureCorners();
@@ -81,11 +83,11 @@ private:
     [[nodiscard]] PatchCells evenly(size_t patch, int step) const;
     void limitSteps(const View& view, size_t patch, Seen& seen) const;
     /// Returns the coarsest step that keeps what is allowed, and sets whether one does; else that of a pixel.
-    int wantedStep(size_t patch, Seen& seen, double allowed);
+    int wantedStep(size_t patch, Seen& seen, double allowed, Scratch& scratch);
     /// Returns what is known of a patch's error, exactly where it is at most `allowed` pixels.
-    Known& known(size_t patch, const Seen& seen, const PatchCells& cells, double allowed);
-    void measure(size_t patch, Known& known, double enough);
-    bool keeps(size_t patch, const Seen& seen, const PatchCells& cells, double allowed);
+    Known& known(size_t patch, const Seen& seen, const PatchCells& cells, double allowed, Scratch& scratch);
+    void measure(size_t patch, Known& known, double enough, Scratch& scratch) const;
+    bool keeps(size_t patch, const Seen& seen, const PatchCells& cells, double allowed, Scratch& scratch);
     void refine(size_t patch, std::vector<uint32_t>& open);
 
     RemeshSurface patches_;
@@ -98,7 +100,8 @@ private:
     std::vector<double> heights_;                      ///< of the corners
     std::vector<std::vector<Known>> known_;            ///< of each patch
     std::vector<Seen> seen_;
-    RemeshMesh<double> swept_;  ///< kept for its memory
+    std::vector<int> wanted_;  ///< steps, of each patch that is seen
+    Scratch scratch_;          ///< kept for its memory
 };
 
 /// Adds the surface's triangles with cells of the map to a mesh. Errors: as remesh().

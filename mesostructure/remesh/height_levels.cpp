@@ -7,7 +7,28 @@
 
 namespace vcp::meso {
 
-Result<HeightLevels> HeightLevels::build(const HeightMap& map, const LevelFitOptions& options) {
+namespace {
+
+HeightLevel sampledLevel(const HeightLevel& map, glm::ivec2 size) {
+    HeightLevel made{size, {}};
+    for (int j = 0; j < size.y; ++j)
+        for (int i = 0; i < size.x; ++i) {
+            const int64_t x = int64_t{i} * map.size.x / size.x, y = int64_t{j} * map.size.y / size.y;
+            made.texels.push_back(map.texels[size_t(x + map.size.x * y)]);
+        }
+    return made;
+}
+
+HeightLevel levelOf(const std::vector<HeightLevel>& below, glm::ivec2 size, const LevelFitOptions& options,
+                    LevelVolume& volume) {
+    if (options.fit == LevelFit::Sampled) return sampledLevel(below.front(), size);
+    if (options.fit == LevelFit::Averaged) return averagedLevel(below.back(), size);
+    return fitLevel(below.front(), size, options, volume);
+}
+
+}  // namespace
+
+Result<HeightLevels> HeightLevels::build(HeightMap map, const LevelFitOptions& options) {
     if (map.size.x < 1 || map.size.y < 1 || map.texels.size() != size_t(map.size.x) * size_t(map.size.y))
         return Error{.message = fmt::format("a height map of {} x {} texels with {} heights", map.size.x, map.size.y,
                                             map.texels.size())};
@@ -15,14 +36,12 @@ Result<HeightLevels> HeightLevels::build(const HeightMap& map, const LevelFitOpt
         return Error{.message = "the range of the heights must be above 0"};
     HeightLevels made;
     made.rows_ = map.extent().y;
-    HeightLevel finest{map.size, std::vector<float>(map.texels.size())};
-    for (size_t i = 0; i < map.texels.size(); ++i) finest.heights[i] = float(map.texels[i] / 65535.0);
-    made.levels_.push_back(std::move(finest));
+    made.levels_.push_back({map.size, std::move(map.texels)});
     made.volumes_.emplace_back();
     while (made.levels_.back().size != glm::ivec2(1) && int(made.levels_.size()) < options.mostLevels) {
         const glm::ivec2 below = made.levels_.back().size, size(std::max(below.x / 2, 1), std::max(below.y / 2, 1));
         LevelVolume volume;
-        HeightLevel level = fitLevel(made.levels_.front(), size, options, volume);
+        HeightLevel level = levelOf(made.levels_, size, options, volume);
         made.levels_.push_back(std::move(level));
         made.volumes_.push_back(volume);
     }
@@ -31,7 +50,7 @@ Result<HeightLevels> HeightLevels::build(const HeightMap& map, const LevelFitOpt
 
 uint64_t HeightLevels::bytes() const {
     uint64_t sum = 0;
-    for (const HeightLevel& level : levels_) sum += level.heights.size() * sizeof(float);
+    for (const HeightLevel& level : levels_) sum += level.texels.size() * sizeof(uint16_t);
     return sum;
 }
 

@@ -1,7 +1,8 @@
 // Filter levels of a height map (Gumhold and Huettner 1999, 4): heights at the corners of ever coarser grids.
 //
-// Heights are parts of the map's range, from 0 to 1. Level 0 is the map; a level has half the edge of the one below,
-// at least 1. Levels repeat as the map does; corner (i, j) of a level lies at the part (i, j) / size of the tile.
+// Heights are parts of the map's range, from 0 to 1, and are kept in 16 bits, as the map has them: those of levels are
+// rounded. Level 0 is the map; a level has half the edge of the one below, at least 1. Levels repeat as the map does;
+// corner (i, j) of a level lies at the part (i, j) / size of the tile.
 #pragma once
 
 #include <cstdint>
@@ -17,21 +18,22 @@ namespace vcp::meso {
 
 enum class LevelFit {
     Sampled,   ///< heights of the map at the corners
-    Averaged,  ///< means over the corners' cells
+    Averaged,  ///< means over the corners' cells, of the level below
     Printed,   ///< least volume, as printed (4.2): differences of the volume, steps of falling size for all at once
     Least,     ///< least volume within the range of the map around each corner, to the optimum
 };
 
 struct HeightLevel {
     glm::ivec2 size{0};
-    std::vector<float> heights;  ///< row by row, x fastest
+    std::vector<uint16_t> texels;  ///< row by row, x fastest; 65535 is 1
 
-    [[nodiscard]] float at(int x, int y) const {
-        return heights[size_t(wrapped(x, size.x)) + size_t(size.x) * size_t(wrapped(y, size.y))];
+    [[nodiscard]] double at(int x, int y) const {
+        return texels[size_t(wrapped(x, size.x)) + size_t(size.x) * size_t(wrapped(y, size.y))] * (1 / 65535.0);
     }
 };
 
-/// What fitting one level did. Volumes are mean distances between level and map, in parts of the range.
+/// What fitting one level did; nothing for levels that are not fitted. Volumes are mean distances between level and
+/// map, in parts of the range.
 struct LevelVolume {
     double averaged = 0;  ///< of the averaged heights, from which fitting starts
     double fitted = 0;
@@ -50,8 +52,9 @@ struct LevelFitOptions {
 
 class HeightLevels {
 public:
-    /// Errors: InvalidInput (a map without texels, of another size than it says, or without a range).
-    static Result<HeightLevels> build(const HeightMap& map, const LevelFitOptions& options = {});
+    /// The map's texels become level 0. Errors: InvalidInput (a map without texels, of another size than it says, or
+    /// without a range).
+    static Result<HeightLevels> build(HeightMap map, const LevelFitOptions& options = {});
 
     [[nodiscard]] const std::vector<HeightLevel>& levels() const { return levels_; }
     [[nodiscard]] const std::vector<LevelVolume>& volumes() const { return volumes_; }  ///< for each level
@@ -74,7 +77,10 @@ private:
     double rows_ = 1;
 };
 
-/// Fits one level of a map's level 0. `volume` gets what was done.
+/// Returns the means of a level around the corners of a coarser one, by the weights with which they count there.
+HeightLevel averagedLevel(const HeightLevel& from, glm::ivec2 size);
+
+/// Fits one level of a map's level 0: LevelFit::Printed or Least. `volume` gets what was done.
 HeightLevel fitLevel(const HeightLevel& map, glm::ivec2 size, const LevelFitOptions& options, LevelVolume& volume);
 
 /// Returns the mean distance between a level and the map, at the map's texels.
@@ -84,7 +90,7 @@ double levelVolume(const HeightLevel& map, const HeightLevel& level);
 template <class Real>
 struct StoredLevels {
     struct RemeshLevel {
-        const float* heights;
+        const uint16_t* texels16;
         glm::ivec2 size;
         glm::vec<2, Real> texels;
     };
@@ -92,10 +98,10 @@ struct StoredLevels {
 
     [[nodiscard]] RemeshLevel remeshLevel(int level) const {
         const HeightLevel& of = from->levels()[size_t(level)];
-        return {of.heights.data(), of.size, {Real(of.size.x), Real(double(of.size.y) / from->rows())}};
+        return {of.texels.data(), of.size, {Real(of.size.x), Real(double(of.size.y) / from->rows())}};
     }
     [[nodiscard]] int remeshLevels() const { return int(from->levels().size()); }
-    [[nodiscard]] static Real remeshTexel(const RemeshLevel& level, int i) { return Real(level.heights[i]); }
+    [[nodiscard]] static uint32_t remeshTexel(const RemeshLevel& level, int i) { return level.texels16[i]; }
 };
 
 template <class Real>

@@ -25,6 +25,35 @@ struct Places {
     }
 };
 
+/// By how much the map's texels count to the corners of a coarser grid, along one axis: as much as the corners count to
+/// them. The shares of a corner add up to 1.
+class Tents {
+public:
+    struct Share {
+        int texel;
+        float weight;
+    };
+
+    Tents(int texels, int corners) : shares_(size_t(corners)) {
+        const Places places(texels, corners);
+        for (int i = 0; i < texels; ++i) {
+            const int corner = places.corner[size_t(i)];
+            const float part = places.part[size_t(i)];
+            shares_[size_t(corner)].push_back({i, 1 - part});
+            if (part > 0) shares_[size_t((corner + 1) % corners)].push_back({i, part});
+        }
+        for (auto& shares : shares_) {
+            double sum = 0;
+            for (const Share& share : shares) sum += share.weight;
+            for (Share& share : shares) share.weight = float(share.weight / sum);
+        }
+    }
+    [[nodiscard]] const std::vector<Share>& of(int corner) const { return shares_[size_t(corner)]; }
+
+private:
+    std::vector<std::vector<Share>> shares_;
+};
+
 /// The bilinear map B from a level's heights to the map's texels.
 class Interpolation {
 public:
@@ -55,12 +84,22 @@ private:
 
 using Heights = std::vector<float>;
 
+/// The map or a level of it, as it is fitted.
+struct FloatMap {
+    glm::ivec2 size;
+    Heights heights;
+
+    explicit FloatMap(const HeightLevel& of) : size(of.size), heights(of.texels.size()) {
+        std::ranges::transform(of.texels, heights.begin(), [](uint16_t texel) { return float(texel / 65535.0); });
+    }
+};
+
 float interpolated(const Heights& heights, const size_t (&corners)[4], const float (&weights)[4]) {
     return weights[0] * heights[corners[0]] + weights[1] * heights[corners[1]] + weights[2] * heights[corners[2]] +
            weights[3] * heights[corners[3]];
 }
 
-double volumeOf(const Interpolation& places, const HeightLevel& map, const Heights& heights) {
+double volumeOf(const Interpolation& places, const FloatMap& map, const Heights& heights) {
     double sum = 0;
     places.each([&](size_t texel, const size_t(&corners)[4], const float(&weights)[4]) {
         sum += std::abs(double(interpolated(heights, corners, weights)) - map.heights[texel]);
@@ -68,29 +107,10 @@ double volumeOf(const Interpolation& places, const HeightLevel& map, const Heigh
     return sum / double(map.heights.size());
 }
 
-Heights sampled(const HeightLevel& map, glm::ivec2 size) {
-    Heights made;
-    for (int j = 0; j < size.y; ++j)
-        for (int i = 0; i < size.x; ++i)
-            made.push_back(map.at(int(int64_t{i} * map.size.x / size.x), int(int64_t{j} * map.size.y / size.y)));
-    return made;
-}
-
-/// Returns the means of the map around the corners, by the weights with which they count.
-Heights averaged(const Interpolation& places, const HeightLevel& map, size_t corners) {
-    std::vector<double> sums(corners, 0), weights(corners, 0);
-    places.each([&](size_t texel, const size_t(&at)[4], const float(&weight)[4]) {
-        for (int k = 0; k < 4; ++k) sums[at[k]] += weight[k] * map.heights[texel], weights[at[k]] += weight[k];
-    });
-    Heights made(corners);
-    for (size_t i = 0; i < corners; ++i) made[i] = float(sums[i] / weights[i]);
-    return made;
-}
-
 /// The method as printed (4.2). Heights are in units of 16-bit texels, epsilon is 10^-4 of them, lambda falls from 2^6
 /// to 2^-2; eq. 12 divides by the influenced area, so that a step is at most lambda. A lambda is left where the volume
 /// no longer falls.
-int fitAsPrinted(const Interpolation& places, const HeightLevel& map, int mostIterations, Heights& heights) {
+int fitAsPrinted(const Interpolation& places, const FloatMap& map, int mostIterations, Heights& heights) {
     constexpr double kUnits = 65535, kEpsilon = 1e-4;
     double volume = volumeOf(places, map, heights);
     int iterations = 0;
@@ -120,7 +140,7 @@ int fitAsPrinted(const Interpolation& places, const HeightLevel& map, int mostIt
 /// boxes is below the least volume: the bound.
 class LeastVolume {
 public:
-    LeastVolume(const Interpolation& places, const HeightLevel& map, Heights start)
+    LeastVolume(const Interpolation& places, const FloatMap& map, Heights start)
         : places_(places),
           map_(map),
           heights_(std::move(start)),
@@ -173,7 +193,7 @@ public:
 
 private:
     const Interpolation& places_;
-    const HeightLevel& map_;
+    const FloatMap& map_;
     Heights heights_, ahead_, best_, least_, most_, step_, dual_, pull_;
     double volume_ = 0, bound_ = 0, scale_ = 1;
 };
@@ -183,26 +203,49 @@ constexpr int kIterationsBetweenBounds = 20;
 }  // namespace
 
 double levelVolume(const HeightLevel& map, const HeightLevel& level) {
-    return volumeOf(Interpolation(map.size, level.size), map, level.heights);
+    return volumeOf(Interpolation(map.size, level.size), FloatMap(map), FloatMap(level).heights);
+}
+
+HeightLevel averagedLevel(const HeightLevel& from, glm::ivec2 size) {
+    const Tents x(from.size.x, size.x), y(from.size.y, size.y);
+    HeightLevel made{size, std::vector<uint16_t>(size_t(size.x) * size_t(size.y))};
+    Heights column(size_t(from.size.x));
+    for (int j = 0; j < size.y; ++j) {
+        std::ranges::fill(column, 0.0f);
+        for (const Tents::Share& share : y.of(j)) {
+            const uint16_t* row = &from.texels[size_t(share.texel) * column.size()];
+            for (size_t i = 0; i < column.size(); ++i) column[i] += share.weight * float(row[i]);
+        }
+        for (int i = 0; i < size.x; ++i) {
+            float sum = 0;
+            for (const Tents::Share& share : x.of(i)) sum += share.weight * column[size_t(share.texel)];
+            made.texels[size_t(i) + size_t(size.x) * size_t(j)] = uint16_t(std::min(sum + 0.5f, 65535.0f));
+        }
+    }
+    return made;
 }
 
 HeightLevel fitLevel(const HeightLevel& map, glm::ivec2 size, const LevelFitOptions& options, LevelVolume& volume) {
     const Interpolation places(map.size, size);
-    HeightLevel level{size, averaged(places, map, size_t(size.x) * size_t(size.y))};
-    volume = {.averaged = volumeOf(places, map, level.heights)};
-    if (options.fit == LevelFit::Sampled) level.heights = sampled(map, size);
-    if (options.fit == LevelFit::Printed)
-        volume.iterations = fitAsPrinted(places, map, options.mostIterations, level.heights);
-    if (options.fit == LevelFit::Least) {
-        LeastVolume fit(places, map, std::move(level.heights));
+    const FloatMap heights(map);
+    HeightLevel level = averagedLevel(map, size);
+    Heights fitted = FloatMap(level).heights;
+    volume = {.averaged = volumeOf(places, heights, fitted)};
+    if (options.fit == LevelFit::Printed) {
+        volume.iterations = fitAsPrinted(places, heights, options.mostIterations, fitted);
+    } else {
+        LeastVolume fit(places, heights, std::move(fitted));
         while (volume.iterations < options.mostIterations && fit.volume() - fit.bound() > options.gap * fit.volume()) {
             fit.iterate(kIterationsBetweenBounds);
             volume.iterations += kIterationsBetweenBounds;
         }
         volume.bound = fit.bound();
-        level.heights = fit.takeBest();
+        fitted = fit.takeBest();
     }
-    volume.fitted = volumeOf(places, map, level.heights);
+    volume.fitted = volumeOf(places, heights, fitted);
+    // The range's ends are multiples of the step, so that nothing overshoots for being rounded.
+    std::ranges::transform(fitted, level.texels.begin(),
+                           [](float height) { return uint16_t(std::lround(65535 * std::clamp(height, 0.0f, 1.0f))); });
     return level;
 }
 

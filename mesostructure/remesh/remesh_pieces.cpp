@@ -1,5 +1,6 @@
 #include "mesostructure/remesh/remesh_pieces.h"
 
+#include <array>
 #include <bit>
 
 #include "mesostructure/remesh/piece_maker.h"
@@ -98,24 +99,27 @@ Result<void> makeRemeshPieces(CertifiedCells& cells, const RemeshCamera& camera,
     RemeshOptions ofMap = options;
     ofMap.access = HeightAccess::Map;
     RemeshCounts counts;
-    cells.choose(camera, options, counts);
+    VCP_TRY(cells.choose(camera, options, counts));
     VCP_TRY(addPieces(cells.patches(), camera, ofMap, &cells, pieces, limits, mostVertices));
     pieces.counts.boundPixels = counts.boundPixels, pieces.counts.uncertified = counts.uncertified;
     return {};
 }
 
-std::vector<uint32_t> remeshLevelWords(const HeightLevels& levels) {
-    std::vector<uint32_t> words;
-    uint32_t first = 4 * uint32_t(levels.levels().size());
+RemeshLevelBytes::RemeshLevelBytes(const HeightLevels& levels) {
+    constexpr size_t kQuad = 16;
+    static constexpr std::array<std::byte, kQuad> kFill{};
+    const auto quadsOf = [](size_t bytes) { return (bytes + kQuad - 1) / kQuad; };
+    size_t first = levels.levels().size();
     for (const HeightLevel& level : levels.levels()) {
-        words.insert(words.end(), {first, uint32_t(level.size.x), uint32_t(level.size.y),
-                                   word(float(double(level.size.y) / levels.rows()))});
-        first += uint32_t(level.heights.size());
+        table_.insert(table_.end(), {uint32_t(first), uint32_t(level.size.x), uint32_t(level.size.y),
+                                     word(float(double(level.size.y) / levels.rows()))});
+        first += quadsOf(level.texels.size() * sizeof(uint16_t));
     }
-    for (const HeightLevel& level : levels.levels())
-        for (const float height : level.heights) words.push_back(word(height));
-    words.resize((words.size() + 3) / 4 * 4);
-    return words;
+    parts_.push_back(std::as_bytes(std::span(table_)));
+    for (const HeightLevel& level : levels.levels()) {
+        parts_.push_back(std::as_bytes(std::span(level.texels)));
+        parts_.push_back(std::span(kFill).first(kQuad * quadsOf(parts_.back().size()) - parts_.back().size()));
+    }
 }
 
 }  // namespace vcp::meso

@@ -3,6 +3,7 @@
 // nothing of each other.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -51,7 +52,18 @@ Result<void> makeRemeshPieces(CertifiedCells& cells, const RemeshCamera& camera,
                               RemeshPieces& pieces, const RemeshBatchLimits& limits = {},
                               uint64_t mostVertices = uint64_t{1} << 26);
 
-/// Returns the levels as words (shared/remesh_layout.h), filled up to whole texels of four.
-std::vector<uint32_t> remeshLevelWords(const HeightLevels& levels);
+/// The levels as devices read them (shared/remesh_layout.h), in whole quads. It refers to the levels.
+class RemeshLevelBytes {
+public:
+    explicit RemeshLevelBytes(const HeightLevels& levels);
+    RemeshLevelBytes(const RemeshLevelBytes&) = delete;
+    RemeshLevelBytes& operator=(const RemeshLevelBytes&) = delete;
+
+    [[nodiscard]] std::span<const std::span<const std::byte>> parts() const { return parts_; }  ///< one after the other
+
+private:
+    std::vector<uint32_t> table_;
+    std::vector<std::span<const std::byte>> parts_;
+};
 
 }  // namespace vcp::meso

@@ -11,7 +11,9 @@
 // Errors on the screen are bounded where that is asked for, triangle by triangle.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <vector>
 
@@ -45,6 +47,9 @@ struct RemeshOptions {
     HeightAccess access = HeightAccess::Sample;
     int mostCells = 256;  ///< of an edge that is not halved: 2 to 1024
     bool bounds = false;  ///< RemeshCounts::boundPixels is filled in; of certified cells it always is
+    /// Shares what certified cells measure: calls `fill` for ranges of [0, count), in any threads, and returns whether
+    /// all was done; false cancels. Empty: the caller's thread does it.
+    std::function<bool(size_t count, const std::function<void(size_t first, size_t last)>& fill)> shareOut = {};
 };
 
 template <class Real>

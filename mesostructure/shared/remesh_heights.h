@@ -1,8 +1,14 @@
 // Heights of filter levels (mesostructure/remesh/height_levels.h) in C++ and GLSL. A level is read as RemeshLevel: its
 // `size` in texels, and its `texels` in a tile unit along x and y. Whoever includes this has
 //   RemeshLevel remeshLevel(int level)                             a level's size and where it is stored
-//   Real remeshTexel(CONST_REF(RemeshLevel) level, int i)          its i-th height, row by row
+//   uint remeshTexel(CONST_REF(RemeshLevel) level, int i)          its i-th height, row by row, of 65535
 //   int remeshLevels()                                             how many there are
+
+// Returns the i-th height of a level: one product, rounded alike everywhere.
+INLINE Real remeshTexelHeight(CONST_REF(RemeshLevel) level, int i) {
+    PRECISE Real height = Real(remeshTexel(level, i)) * Real(1.5259021896696422e-5);
+    return height;
+}
 
 // Returns the remainder of a whole number by n, from 0 to n - 1.
 INLINE int remeshWrapped(Real x, int n) {
@@ -17,8 +23,9 @@ INLINE Real remeshLevelHeight(CONST_REF(RemeshLevel) level, Real2 at) {
     int i = remeshWrapped(left, level.size.x), j = remeshWrapped(lower, level.size.y);
     int after = i + 1 < level.size.x ? i + 1 : 0, row = j * level.size.x,
         above = (j + 1 < level.size.y ? j + 1 : 0) * level.size.x;
-    PRECISE Real low = remeshTexel(level, row + i) * (Real(1) - u) + remeshTexel(level, row + after) * u;
-    PRECISE Real high = remeshTexel(level, above + i) * (Real(1) - u) + remeshTexel(level, above + after) * u;
+    PRECISE Real low = remeshTexelHeight(level, row + i) * (Real(1) - u) + remeshTexelHeight(level, row + after) * u;
+    PRECISE Real high =
+        remeshTexelHeight(level, above + i) * (Real(1) - u) + remeshTexelHeight(level, above + after) * u;
     PRECISE Real height = low * (Real(1) - v) + high * v;
     return height;
 }

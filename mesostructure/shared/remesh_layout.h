@@ -11,6 +11,6 @@
 // 14 to 17  frame: by u, turned; by v; direction by u; direction by v
 // 18        frame: the triangle's own normal
 //
-// Of the levels a quad each: the word at which its heights begin, its width and height, its texels in a tile unit along
-// y; then the heights.
+// Of the levels a quad each: the quad at which its heights begin, its width and height, its texels in a tile unit along
+// y; then the heights, eight of 16 bits a quad, the first in a word's low half.
 CONSTANT uint kRemeshPieceQuads = 19u;

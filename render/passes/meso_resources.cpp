@@ -58,6 +58,16 @@ Result<MesoTexels> MesoResources::words(std::span<const uint32_t> words) {
     return made;
 }
 
+Result<MesoTexels> MesoResources::quads(std::span<const std::span<const std::byte>> parts) {
+    uint64_t bytes = 0;
+    for (const auto part : parts) bytes += part.size();
+    VCP_TRY(checkTexels(bytes / 16, "heights"));
+    MesoTexels made;
+    VCP_TRY_ASSIGN(made.buffer, device_.createFilled(parts, VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT));
+    VCP_TRY_ASSIGN(made.quads, device_.createTexelView(made.buffer, VK_FORMAT_R32G32B32A32_UINT, bytes));
+    return made;
+}
+
 Result<void> MesoResources::checkTexels(uint64_t count, const char* what) const {
     if (count > device_.limits().maxTexelBufferElements)
         return Error{.code = ErrorCode::Limit,

@@ -43,7 +43,7 @@ struct MesoConstants {
 /// A buffer that shaders read as texels of one or two formats.
 struct MesoTexels {
     Buffer buffer;
-    TexelView view, quads;  ///< `quads` are views of words only
+    TexelView view, quads;  ///< `quads` are views of words, which may have nothing else
 };
 
 /// A descriptor set with a pool of its own; frees both.
@@ -78,6 +78,8 @@ public:
 
     /// Makes texels of words. Errors: Device (no memory); Limit (more texels than the device reads).
     Result<MesoTexels> words(std::span<const uint32_t> words);
+    /// Makes texels of four words of parts that follow each other, 16 bytes each; `quads` alone.
+    Result<MesoTexels> quads(std::span<const std::span<const std::byte>> parts);
     Result<MesoTexels> vectors(std::span<const glm::vec4> vectors);
     Result<MesoTexels> halfs(std::span<const uint64_t> halfs);  ///< four to a texel
     Result<MesoTexels> emptyHalfs(uint64_t texels);             ///< to be filled by copies

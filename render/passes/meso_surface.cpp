@@ -47,7 +47,7 @@ Result<void> MesoSurfacePass::setSurfaces(std::span<const MesoSurface> surfaces)
             const meso::HeightLevels& heights = *made.remeshed.surface->heights;
             auto& kept = levels[&heights];
             if (!kept) {
-                VCP_TRY_ASSIGN(auto texels, resources_.words(meso::remeshLevelWords(heights)));
+                VCP_TRY_ASSIGN(auto texels, resources_.quads(meso::RemeshLevelBytes(heights).parts()));
                 kept = std::make_shared<MesoTexels>(std::move(texels));
             }
             made.levels = kept;
@@ -168,6 +168,7 @@ Result<void> MesoSurfacePass::prepare(MesoTarget& target, const Picture& picture
         target.depths != picture.depths->handle())
         VCP_TRY(makeTarget(target, size, planes, picture));
     const bool inScene = picture.sceneLight != nullptr;
+    target.remeshed.certifiedPixels = 0, target.remeshed.uncertified = 0;
     for (size_t i = 0; i < surfaces_.size(); ++i) {
         const Placed& surface = surfaces_[i];
         VCP_TRY(choosePipelines(surface, target.drawings[i], request.shading, inScene));

@@ -1,5 +1,6 @@
 #include "render/passes/remesh_raster.h"
 
+#include <algorithm>
 #include <cstddef>
 
 #include <fmt/format.h>
@@ -99,6 +100,8 @@ Result<void> RemeshRaster::remesh(RemeshTarget& target, size_t number, const Rem
         VCP_TRY(meso::makeRemeshPieces(*surface.surface, camera, surface.options, target.pieces, sweep_.limits()));
     }
     drawing.view = target.pieces.view;
+    target.certifiedPixels = std::max(target.certifiedPixels, target.pieces.counts.boundPixels);
+    target.uncertified += target.pieces.counts.uncertified;
     return sweep_.prepare(drawing.batches, target.pieces, levels);
 }
 

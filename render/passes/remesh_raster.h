@@ -48,7 +48,9 @@ struct RemeshTarget {
     RasterTarget images;
     std::array<MesoTexels, 2> copies;  ///< hits and normals, as remesh.frag writes them
     std::vector<RemeshDrawing> drawings;
-    meso::RemeshPieces pieces;  ///< of the last surface; kept for its memory
+    meso::RemeshPieces pieces;   ///< of the last surface; kept for its memory
+    double certifiedPixels = 0;  ///< of all surfaces, as meso::RemeshCounts has them
+    uint64_t uncertified = 0;
 };
 
 class RemeshRaster {
@@ -59,7 +61,7 @@ public:
     Result<void> prepare(RemeshTarget& target, PictureSize size, size_t surfaces);
     /// Forgets what is known of surfaces, which are no more.
     void forget() { cells_.clear(); }
-    /// Makes and uploads the pieces of a surface for a view. `levels`: meso::remeshLevelWords() of its heights.
+    /// Makes and uploads the pieces of a surface for a view. `levels`: meso::RemeshLevelBytes of its heights.
     /// Precondition: no frame in flight uses the target. Errors: Device; those of meso::makeRemeshPieces and
     /// of meso::CertifiedCells::create.
     Result<void> remesh(RemeshTarget& target, size_t number, const RemeshedSurface& surface, const MesoTexels& levels,

@@ -16,9 +16,9 @@ namespace {
 
 using Math = meso::RemeshMath<float>;
 
-constexpr VkDescriptorType kBindings[] = {kTexels, kTexels, kTexels, kTexels, kStorage, kStorage, kStorage, kStorage};
+constexpr VkDescriptorType kBindings[] = {kTexels, kTexels, kTexels, kStorage, kStorage, kStorage, kStorage};
 constexpr uint32_t kBindingCount = std::size(kBindings);
-constexpr VkDescriptorPoolSize kPoolSizes[] = {{kTexels, 4}, {kStorage, 4}};
+constexpr VkDescriptorPoolSize kPoolSizes[] = {{kTexels, 3}, {kStorage, 4}};
 // Columns of a workgroup of the counting and of the writing shader.
 constexpr uint32_t kCounted = 256, kEmitted = 64;
 constexpr uint64_t kVertexBytes = sizeof(meso::RemeshVertex<float>);
@@ -89,8 +89,7 @@ Result<void> RemeshSweepPass::upload(RemeshSwept& swept, const meso::RemeshBatch
 }
 
 void RemeshSweepPass::writeSet(const RemeshSwept& swept, const MesoTexels& levels) const {
-    const VkBufferView views[] = {levels.view.handle(), levels.quads.handle(), swept.quadsView.handle(),
-                                  swept.firstColumnsView.handle()};
+    const VkBufferView views[] = {levels.quads.handle(), swept.quadsView.handle(), swept.firstColumnsView.handle()};
     const VkBuffer buffers[] = {swept.counts.handle(), swept.drawn.handle(), swept.vertices.handle(),
                                 swept.indices.handle()};
     VkDescriptorBufferInfo infos[kBindingCount] = {};

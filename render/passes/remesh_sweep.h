@@ -36,7 +36,7 @@ public:
     /// Returns what a batch may have on this device.
     [[nodiscard]] meso::RemeshBatchLimits limits() const;
     /// Uploads the pieces, and makes room for what they become; batches that are no longer used keep theirs.
-    /// `levels`: remeshLevelWords(). Precondition: no frame in flight uses the batches; they are
+    /// `levels`: RemeshLevelBytes. Precondition: no frame in flight uses the batches; they are
     /// within limits(). Errors: Device.
     Result<void> prepare(std::vector<RemeshSwept>& swept, const meso::RemeshPieces& pieces, const MesoTexels& levels);
     /// Records the sweep. Precondition: prepare() with the same pieces.

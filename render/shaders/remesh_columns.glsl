@@ -8,12 +8,12 @@ layout(push_constant) uniform RemeshBlock {
     uint pieces, columns;
     uint mostVertices, mostIndices;  // that there is room for
 };
-layout(set = 0, binding = 3) uniform utextureBuffer firstColumns;
+layout(set = 0, binding = 2) uniform utextureBuffer firstColumns;
 // Vertices and indices before a column within its workgroup; then before the workgroup, and their sum.
-layout(set = 0, binding = 4, std430) buffer CountBlock { uvec2 counts[]; };
-layout(set = 0, binding = 5, std430) buffer DrawBlock { uint drawn[]; };  // VkDrawIndexedIndirectCommand, and vertices
-layout(set = 0, binding = 6, std430) buffer VertexBlock { vec4 vertices[]; };
-layout(set = 0, binding = 7, std430) buffer IndexBlock { uint indices[]; };
+layout(set = 0, binding = 3, std430) buffer CountBlock { uvec2 counts[]; };
+layout(set = 0, binding = 4, std430) buffer DrawBlock { uint drawn[]; };  // VkDrawIndexedIndirectCommand, and vertices
+layout(set = 0, binding = 5, std430) buffer VertexBlock { vec4 vertices[]; };
+layout(set = 0, binding = 6, std430) buffer IndexBlock { uint indices[]; };
 
 const uint kCounted = 256u;  // columns of a workgroup of remesh_count.comp
 

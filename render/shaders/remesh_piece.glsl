@@ -1,9 +1,8 @@
 // A piece of a remeshed surface, by the shared maths: what the sweep (remesh_columns.glsl) and patches
 // (remesh_patch.glsl) have in common. Whoever includes this has pushed `view`, `levels` and `mapWidth`, and has
 // remeshAddVertex and remeshAddTriangle (mesostructure/shared/remesh_sweep.h).
-layout(set = 0, binding = 0) uniform utextureBuffer levelWords;
-layout(set = 0, binding = 1) uniform utextureBuffer levelQuads;
-layout(set = 0, binding = 2) uniform utextureBuffer pieceQuads;
+layout(set = 0, binding = 0) uniform utextureBuffer levelQuads;
+layout(set = 0, binding = 1) uniform utextureBuffer pieceQuads;
 
 uint firstPieceQuad;  // of the invocation's piece
 
@@ -68,7 +67,10 @@ RemeshLevel remeshLevel(int number) {
     level.texels = vec2(float(level.size.x), uintBitsToFloat(stored.w));
     return level;
 }
-float remeshTexel(RemeshLevel level, int i) { return uintBitsToFloat(texelFetch(levelWords, level.first + i).x); }
+uint remeshTexel(RemeshLevel level, int i) {
+    uint word = texelFetch(levelQuads, level.first + (i >> 3))[i >> 1 & 3];
+    return word >> uint((i & 1) << 4) & 0xffffu;
+}
 
 #include "mesostructure/shared/remesh_heights.h"
 #include "mesostructure/shared/remesh_sweep.h"

@@ -2,6 +2,9 @@
 
 #include <chrono>
 #include <limits>
+#include <set>
+
+#include <fmt/format.h>
 
 #include "render/frame_setup.h"
 #include "render/view/renderer_view.h"
@@ -78,9 +81,28 @@ Result<void> Renderer::setBudgets(uint64_t budgetBytes, uint64_t ramBytes) {
     return {};
 }
 
+namespace {
+
+/// What heights take on the device is known before they are copied there.
+Result<void> checkHeights(std::span<const MesoSurface> surfaces, uint64_t budgetBytes) {
+    std::set<const meso::HeightLevels*> all;
+    uint64_t bytes = 0;
+    for (const MesoSurface& surface : surfaces)
+        if (surface.remeshed.surface && all.insert(surface.remeshed.surface->heights.get()).second)
+            bytes += surface.remeshed.surface->heights->bytes();
+    if (bytes <= budgetBytes) return {};
+    return Error{
+        .code = ErrorCode::Limit,
+        .message = fmt::format("the heights of remeshed surfaces take {} bytes, and the budget is {}: allow more",
+                               bytes, budgetBytes)};
+}
+
+}  // namespace
+
 Result<void> Renderer::setSurfaces(std::span<const MesoSurface> surfaces) {
     Shared& s = *view_->shared;
     if (!s.device) return kGone;
+    VCP_TRY(checkHeights(surfaces, s.options.budgetBytes));
     VCP_TRY(s.device->waitForAll());
     const uint64_t before = s.surfaceBytes();
     for (View* view : s.views) view->forgetFrames();

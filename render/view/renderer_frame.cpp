@@ -250,6 +250,8 @@ Result<void> Renderer::View::recordSurfaces(VkCommandBuffer commands, Frame& fra
     if (!frame.isLit) frame.surfacesTimer.mark(commands, 1);
     frame.stats.pipelines += meso.resources->pipelinesMade();
     frame.stats.surfaceBytes = meso.pass->assetBytes();
+    frame.stats.remeshedPixels = frame.surfaces.remeshed.certifiedPixels;
+    frame.stats.uncertifiedPatches = frame.surfaces.remeshed.uncertified;
     return {};
 }
 

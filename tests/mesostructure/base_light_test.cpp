@@ -28,7 +28,7 @@ using glm::dvec2, glm::dvec3, f64::Harmonics, f64::harmonicsOf;
 HeightMap flat() { return {{8, 8}, 0.25, std::vector<uint16_t>(64, 39321)}; }
 
 /// Traces all vertices of a scene against its triangles.
-BaseTransfer transferOf(const BaseScene& scene, BaseTransferOptions options = {}) {
+Result<std::vector<BaseTransfer>> tracedOf(const BaseScene& scene, BaseTransferOptions options) {
     const IndexedMesh mesh{scene.positions, scene.triangles, {}};
     const MeshBvh bvh(mesh);
     options.cast = [&](dvec3 origin, dvec3 direction) -> std::optional<BaseHit> {
@@ -37,7 +37,11 @@ BaseTransfer transferOf(const BaseScene& scene, BaseTransferOptions options = {}
         return BaseHit{hit->triangle, hit->t};
     };
     const std::array all{std::pair(0u, uint32_t(scene.positions.size()))};
-    auto made = traceBaseTransfer(scene, all, options);
+    return traceBaseTransfer(scene, all, options);
+}
+
+BaseTransfer transferOf(const BaseScene& scene, const BaseTransferOptions& options = {}) {
+    auto made = tracedOf(scene, options);
     EXPECT_TRUE(made) << made.error().line();
     return std::move((*made)[0]);
 }
@@ -189,16 +193,26 @@ TEST(BaseTransfer, DoesNotDependOnHowItIsSharedOut) {
     scene.add(*makeBaseSurface("torus", 2), 0.05, 0.5);
     BaseTransferOptions options{.rays = 32};
     const BaseTransfer whole = transferOf(scene, options);
-    options.shareOut = [](size_t count, const auto& fill) {
+    double done = 0;
+    options.shareOut = [&](size_t count, const auto& fill, BaseTransferOptions::Part part) {
+        EXPECT_GE(part.before, done) << "progress goes forward";
+        EXPECT_GT(part.after, part.before);
+        done = part.after;
         for (size_t i = count; i > 0; --i) fill(i - 1, i);
         return true;
     };
     const BaseTransfer parts = transferOf(scene, options);
     EXPECT_EQ(whole.numbers, parts.numbers);
     EXPECT_EQ(whole.changes, parts.changes);
-    options.shareOut = [](size_t, const auto&) { return false; };
-    options.cast = [](dvec3, dvec3) { return std::nullopt; };
-    EXPECT_EQ(traceBaseTransfer(scene, {}, options).error().code, ErrorCode::Cancelled);
+    EXPECT_EQ(done, 1);
+    // It can be cancelled in each of its stages: rays, bounces, and what comes of them.
+    for (const double until : {0.0, 0.6, 0.74, 0.75}) {
+        options.shareOut = [&](size_t count, const auto& fill, BaseTransferOptions::Part part) {
+            fill(0, count);
+            return part.before < until;
+        };
+        EXPECT_EQ(tracedOf(scene, options).error().code, ErrorCode::Cancelled) << until;
+    }
     EXPECT_EQ(traceBaseTransfer(scene, {}, {.memoryBytes = 1000}).error().code, ErrorCode::Limit);
     EXPECT_EQ(traceBaseTransfer(scene, {}, {.rays = 0}).error().code, ErrorCode::Usage);
     EXPECT_EQ(traceBaseTransfer(scene, {}, {.rays = 1000000}).error().code, ErrorCode::Usage);

@@ -58,7 +58,7 @@ TEST(KnownError, TheAssetsOwnHeightsAreHitExactly) {
         EXPECT_GT(found.hits, 1000);
         EXPECT_LE(found.worst, kRounding);
     }
-    EXPECT_EQ(exact, (std::set<std::string_view>{"pyramid", "boxes", "cells", "gdm-safe"}));
+    EXPECT_EQ(exact, (std::set<std::string_view>{"pyramid", "boxes", "cells", "ddm-cells", "gdm-safe"}));
 }
 
 TEST(KnownError, HitsInCellsOfSolidsAreNoFartherThanAcrossACell) {

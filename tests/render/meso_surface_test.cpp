@@ -51,7 +51,7 @@ TEST_F(MesoSurfaces, PlateauOnAQuadIsAPlane) {
         const auto depths = *renderer_->readDepth();
         const auto normals = *renderer_->readNormals();
         // Distance maps alone show whole cells.
-        const bool isCells = method == "dm" || method == "ddm";
+        const bool isCells = method == "dm" || method == "ddm" || method == "ddm-compressed";
         // A step for linear search, a hundredth of the slab for relief mapping; what a sampled distance may be too long
         // for sphere tracing. Displacement maps bend between their points, slices are seen where they lie: both are a
         // third of the slab apart.

@@ -53,6 +53,43 @@ protected:
     }
 };
 
+TEST_F(RemeshedSurfaces, TheCertificateIsInTheStatistics) {
+    MesoSurface surface = surfaceOf(*makeHeightField("fbm", 64, 1), "quad", 0.3);
+    const auto statsAt = [&](double errorPixels, glm::dvec3 eye) {
+        surface.remeshed.options.errorPixels = errorPixels;
+        EXPECT_TRUE(renderer_->setSurfaces(std::span(&surface, 1)).ok());
+        return RendererFixture::draw(lookFrom(eye));
+    };
+    const FrameStats kept = statsAt(0.5, {0, 0, 5});
+    EXPECT_GT(kept.remeshedPixels, 0.1);
+    EXPECT_LE(kept.remeshedPixels, 0.5);
+    EXPECT_EQ(kept.uncertifiedPatches, 0u);
+    // From within the slab nothing is known of the nearest patches.
+    EXPECT_GT(statsAt(0.5, {0.3, 0.2, 0.2}).uncertifiedPatches, 0u);
+    const FrameStats none = statsAt(0, {0, 0, 5});
+    EXPECT_EQ(none.remeshedPixels, 0);
+    EXPECT_EQ(none.uncertifiedPatches, 0u);
+}
+
+TEST_F(RemeshedSurfaces, HeightsBeyondTheBudgetAreRefused) {
+    const MesoSurface surface = surfaceOf(*makeHeightField("needle", 1024, 1), "quad", 0.3);
+    const uint64_t bytes = surface.remeshed.surface->heights->bytes();
+    EXPECT_GT(bytes, uint64_t{2} << 20);
+    EXPECT_LT(bytes, uint64_t{3} << 20);
+    RendererOptions options;
+    for (const bool isEnough : {false, true}) {
+        options.budgetBytes = bytes - (isEnough ? 0 : 1);
+        start(options);
+        const std::vector<MesoSurface> twice{surface, surface};
+        const auto set = renderer_->setSurfaces(twice);
+        ASSERT_EQ(set.ok(), isEnough);
+        if (isEnough) continue;
+        EXPECT_EQ(set.error().code, ErrorCode::Limit);
+        EXPECT_EQ(set.error().line(), "the heights of remeshed surfaces take " + std::to_string(bytes) +
+                                          " bytes, and the budget is " + std::to_string(bytes - 1) + ": allow more");
+    }
+}
+
 TEST_F(RemeshedSurfaces, PlateauOnAQuadIsAPlane) {
     for (const bool isOrthographic : {true, false}) {
         SCOPED_TRACE(isOrthographic);

@@ -69,7 +69,7 @@ protected:
         return sweptMesh(*cells.patches().heights);
     }
     Mesh sweptMesh(const HeightLevels& heights) {
-        const MesoTexels levels = *resources_->words(remeshLevelWords(heights));
+        const MesoTexels levels = *resources_->quads(RemeshLevelBytes(heights).parts());
         EXPECT_TRUE(pass_->prepare(swept_, pieces_, levels));
         EXPECT_TRUE(device_->submitAndWait([&](VkCommandBuffer commands) {
             barrierToAll(commands);

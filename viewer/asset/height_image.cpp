@@ -67,19 +67,19 @@ bool readRows(PngReader& reader, png_bytepp rows) {
 }
 
 Result<meso::HeightMap> exrHeights(std::span<const std::byte> file, double range) {
-    VCP_TRY_ASSIGN(const auto picture, decodeExr(file, meso::kMaxGridEdge));
+    VCP_TRY_ASSIGN(const auto picture, decodeExr(file, meso::kMaxMapEdge));
     return heightsOf(picture, range);
 }
 
 /// Decodes a PNG, which may be hostile. Errors, without file: as checkPng(), InvalidInput (damaged), Limit (above
-/// `kMaxGridEdge`).
+/// `kMaxMapEdge`).
 Result<meso::HeightMap> pngHeights(std::string_view file, double range) {
     VCP_TRY_ASSIGN(const auto chunks, checkPng(*randomBytesAt(file)));
     const uint32_t width = chunks.width, height = chunks.height;
-    if (width > uint32_t(meso::kMaxGridEdge) || height > uint32_t(meso::kMaxGridEdge))
+    if (width > uint32_t(meso::kMaxMapEdge) || height > uint32_t(meso::kMaxMapEdge))
         return Error{.code = ErrorCode::Limit,
                      .message = fmt::format("{} x {} texels; a height map has at most {} an edge", width, height,
-                                            meso::kMaxGridEdge)};
+                                            meso::kMaxMapEdge)};
     const std::string texels = withoutText(file);
     PngReader reader;
     const auto damaged = [&] {

@@ -11,7 +11,7 @@ namespace vcp {
 /// Decodes a PNG of 1 to 16 bits a channel as heights without any gamma: grey, or the mean of red, green and blue;
 /// alpha is left out; 8 bits become 16 by v * 257, and white is `range` high, tile units. Or an EXR
 /// (viewer/asset/exr_picture.h): heightsOf its values. The picture's upper row is the tile's highest y. The bytes may
-/// be hostile. Errors, without file: InvalidInput (damaged, truncated, another format), Limit (more than kMaxGridEdge
+/// be hostile. Errors, without file: InvalidInput (damaged, truncated, another format), Limit (more than kMaxMapEdge
 /// texels), Unsupported (kinds of EXR).
 Result<meso::HeightMap> decodeHeights(std::span<const std::byte> file, double range);
 

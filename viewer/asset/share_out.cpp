@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <condition_variable>
+#include <mutex>
 #include <thread>
 #include <vector>
 
@@ -12,6 +14,8 @@ bool shareOut(size_t count, const std::function<void(size_t first, size_t last)>
               const std::function<bool(double part)>& progress) {
     constexpr size_t kRange = 16;
     std::atomic<size_t> next = 0, done = 0;
+    std::mutex mutex;
+    std::condition_variable isDone;
     std::atomic<bool> isStopped = false;
     const auto work = [&] {
         while (!isStopped) {
@@ -19,14 +23,17 @@ bool shareOut(size_t count, const std::function<void(size_t first, size_t last)>
             if (first >= count) return;
             const size_t last = std::min(count, first + kRange);
             fill(first, last);
-            done += last - first;
+            if ((done += last - first) != count) continue;
+            const std::lock_guard lock(mutex);
+            isDone.notify_one();
         }
     };
     std::vector<std::jthread> threads;
     for (unsigned i = 0; i < std::max(1u, std::thread::hardware_concurrency()); ++i) threads.emplace_back(work);
     while (done < count && !isStopped) {
         if (progress && !progress(double(done) / double(count))) isStopped = true;
-        std::this_thread::sleep_for(std::chrono::milliseconds(20));
+        std::unique_lock lock(mutex);
+        isDone.wait_for(lock, std::chrono::milliseconds(20), [&] { return done == count; });
     }
     threads.clear();
     return !isStopped;

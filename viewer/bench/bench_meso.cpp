@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <ctime>
 #include <memory>
 #include <numbers>
 #include <random>
@@ -187,8 +186,14 @@ std::vector<Entry> entries() {
             all.push_back({fmt::format("{}grid 128 cap {}", name == std::string_view("ddm") ? "4x1 " : "", cap),
                            false,
                            {.name = name, .cells = 128, .cap = cap}});
+    all.push_back({"4x1 grid 64 paper", false, {.name = "ddm", .cells = 64, .distances = DistanceRule::Paper}});
     for (const int cells : {16, 32, 64, 128})
         all.push_back({fmt::format("4x1 grid {}", cells), cells == 64, {.name = "ddm-quadric", .cells = cells}});
+    for (const int cells : {16, 32, 64, 128})
+        all.push_back({fmt::format("grid {}", cells), cells == 64, {.name = "quadric", .cells = cells}});
+    for (const char* name : {"ddm-compressed", "ddm-cells"})
+        for (const int cells : {64, 128})
+            all.push_back({fmt::format("4x1 grid {}", cells), cells == 64, {.name = name, .cells = cells}});
     for (const int cells : {16, 32, 64})
         all.push_back({fmt::format("4x1 grid {}", cells), cells == 32, {.name = "ddm-quadric-fitted", .cells = cells}});
     for (const int cells : {16, 32, 64, 128})
@@ -206,11 +211,10 @@ std::vector<MesoMarched> marchHere(const std::vector<Measured>& methods, const s
     for (int round = 0; round <= rounds; ++round)
         for (size_t m = 0; m < methods.size(); ++m) {
             all[m].results.resize(rays.size());
-            const std::clock_t start = std::clock();
+            const double start = processorNs();
             for (size_t i = 0; i < rays.size(); ++i) all[m].results[i] = methods[m].marcher->march(rays[i]);
             if (round > 0)
-                all[m].nsPerRay.push_back(double(std::clock() - start) * 1e9 / CLOCKS_PER_SEC /
-                                          double(std::max<size_t>(1, rays.size())));
+                all[m].nsPerRay.push_back((processorNs() - start) / double(std::max<size_t>(1, rays.size())));
         }
     return all;
 }
@@ -324,7 +328,8 @@ bool isAsked(const std::vector<std::string>& asked, std::string_view name) {
 Result<std::vector<BenchMesoRow>> rowsOf(Subject& subject, const BenchMesoOptions& options, MesoMarcher* renderer,
                                          const std::function<bool(const std::string&)>& told) {
     const auto isMeasured = [&](const Entry& e) {
-        return isAsked(options.methods, e.options.name) && (options.sweep || e.isDefault) &&
+        return isAsked(options.methods, e.options.name) &&
+               (options.sweep || e.isDefault || (options.published && isOfPublished(e.options.name, e.knob))) &&
                methodFits(e.options.name, subject.asset);
     };
     // The peer is measured with them, requested or not.
@@ -367,7 +372,7 @@ std::string_view mesoPeer(bool isHeightField) { return isHeightField ? "relief-b
 std::vector<std::string> mesoMethodNames() {
     std::vector<std::string> names;
     for (const Entry& entry : entries())
-        if (names.empty() || names.back() != entry.options.name) names.push_back(entry.options.name);
+        if (std::ranges::find(names, entry.options.name) == names.end()) names.push_back(entry.options.name);
     return names;
 }
 
@@ -389,6 +394,12 @@ Result<BenchMesoReport> benchMeso(const BenchMesoOptions& options) {
         VCP_TRY_ASSIGN(renderer, MesoMarcher::create({.device = *options.device}));
     }
     BenchMesoReport report;
+    if (options.prisms) report.prisms = compareMesoPrisms(uint64_t(options.rays));
+    std::vector<MesoPublished> ofModels;
+    if (options.models) {
+        VCP_TRY_ASSIGN(report.models, compareMesoModels(options.device.value_or(kHostName), options.repetitions,
+                                                        ofModels, options.progress));
+    }
     for (size_t a = 0; a < assets.size(); ++a) {
         const auto told = [&](const std::string& what) {
             return !options.progress || options.progress(assets[a] + ": " + what, double(a) / double(assets.size()));
@@ -419,6 +430,7 @@ Result<BenchMesoReport> benchMeso(const BenchMesoOptions& options) {
         return Error{.code = ErrorCode::Usage, .message = "none of these methods is of these assets"};
     if (options.published) {
         report.published = publishedOf(report.rows);
+        report.published.insert(report.published.end(), ofModels.begin(), ofModels.end());
         VCP_TRY(compareCompression(report.published));
         compareFactors(report.published);
         VCP_TRY_ASSIGN(const auto remeshed, remeshPublished());

@@ -11,6 +11,7 @@
 
 #include <array>
 #include <cstdint>
+#include <ctime>
 #include <functional>
 #include <optional>
 #include <string>
@@ -31,9 +32,11 @@ struct BenchMesoOptions {
     bool sweep = false;                 ///< each method at several values of its knob
     int rays = 2000;                    ///< a view
     int repetitions = 3;                ///< rounds over the methods
-    bool published = false;             ///< compares with the paper's tables; its Table 3 is made anew
+    bool published = false;             ///< compares with the papers' tables, each method at the knobs that these need
     bool factors = false;               ///< compares the factors of displacement maps
     bool light = false;                 ///< compares light from everywhere on a tile with a path tracer
+    bool prisms = false;                ///< measures what maps from prisms to tile space distort
+    bool models = false;                ///< times frames of six models, on `device`, or by the host
     bool remesh = false;                ///< measures remeshing as well (bench_remesh.h)
     bool tessellation = false;          ///< beside the sweep, by the device's tessellator
     uint64_t checkRays = 0;             ///< rays of the conservative test for each asset; 0: not made
@@ -50,7 +53,8 @@ inline constexpr std::array<std::string_view, 6> kMesoClassNames = {"hit",   "mi
 struct MesoJudged {
     std::array<double, 6> fractions{};
     double p50 = 0, p95 = 0, p99 = 0, max = 0;
-    double normalP50 = 0, normalP95 = 0;  ///< degrees, of the methods that give normals
+    bool hasNormals = false;              ///< false: the method gives none
+    double normalP50 = 0, normalP95 = 0;  ///< degrees
 
     [[nodiscard]] double fraction(MesoClass c) const { return fractions[size_t(c)]; }
     /// The fraction that is missed, false, of a wrong feature or unresolved.
@@ -127,6 +131,34 @@ struct MesoLight {
     uint64_t bytes = 0;      ///< of the volume
 };
 
+/// Distances of places in the tile, in texels.
+struct MesoDistortion {
+    double p50 = 0, p95 = 0;
+};
+
+/// What maps from the prisms over a torus make of rays: through random places of random prisms, in random directions.
+/// There are three maps (mesostructure/prism_maps.h), compared with the curved one, and all with the smooth torus',
+/// whose heights are parallel surfaces.
+struct MesoPrisms {
+    double turnDegrees = 0;       ///< that one prism turns round the tube
+    double heightOverRadius = 0;  ///< the slab's height over the tube's radius
+    uint64_t prisms = 0, cutColumns = 0, rays = 0;
+    uint64_t between = 0;  ///< places between a bilinear side and its two triangles, which are not compared
+    MesoDistortion straight, linear;
+    MesoDistortion straightSmooth, linearSmooth, curvedSmooth;
+    double printedWrong = 0;  ///< part of the rays whose exit by planes, as printed, is not where they leave the prism
+};
+
+/// Frames of a model: a base with mesostructure, drawn in local light (one lamp, with shadows) or light from
+/// everywhere.
+struct MesoModel {
+    std::string asset, base, method, light, device;
+    uint64_t prisms = 0, pixels = 0;  ///< pixels that it covers
+    uint64_t unresolved = 0;          ///< rays
+    double msFrame = 0;               ///< median; of the processor, all threads, or of a GPU
+    double nsPixel = 0, nsPrism = 0;
+};
+
 /// One view of a remeshed height field (bench_remesh.h).
 struct RemeshRow {
     std::string asset, view, filter;
@@ -159,6 +191,8 @@ struct BenchMesoReport {
     std::vector<MesoPublished> published;
     std::vector<MesoFactors> factors;
     std::vector<MesoLight> lights;
+    std::vector<MesoPrisms> prisms;
+    std::vector<MesoModel> models;
 };
 
 /// Names the method, at its default knob, that times are divided by: relief mapping, binary, 32 steps, for height
@@ -184,13 +218,28 @@ Result<std::vector<MesoFactors>> compareMesoFactors(const meso::Asset& asset, co
 Result<std::vector<MesoLight>> compareMesoLight(const std::string& name, const meso::Asset& asset,
                                                 const meso::Shape& shape, const std::function<bool(double)>& progress);
 
+/// Returns the processor's time of this process so far, all threads, in nanoseconds.
+inline double processorNs() { return double(std::clock()) * 1e9 / CLOCKS_PER_SEC; }
+
+/// Measures what maps of prisms distort, on tori of several curvatures and numbers of triangles.
+std::vector<MesoPrisms> compareMesoPrisms(uint64_t rays);
+
+/// Times frames of the six models that Wang et al. 2004 print rates of, in rounds over all of them, and adds the ratios
+/// beside the printed ones. `device`: as RendererOptions::device; `progress` may be empty; false cancels. Errors: those
+/// of the renderer and of traceTransfer; Cancelled.
+Result<std::vector<MesoModel>> compareMesoModels(
+    const std::string& device, int repetitions, std::vector<MesoPublished>& published,
+    const std::function<bool(const std::string& what, double part)>& progress);
+
 /// Judges the rays whose truth is known; `texel` in tile units.
 MesoJudged judgeMeso(const std::vector<meso::MarchResult>& results, const std::vector<meso::TruthHit>& truths,
                      double texel);
 /// Writes the mean work, its bins and divergence into the row.
 void countWork(const std::vector<meso::MarchResult>& results, BenchMesoRow& row);
 
-/// Compares with Tables 1 and 2 and the secant's claim, as far as the rows allow.
+/// Whether a method at that knob is in a ratio that publishedOf compares.
+bool isOfPublished(std::string_view method, std::string_view knob);
+/// Compares with the printed ratios of single methods, as far as the rows allow.
 std::vector<MesoPublished> publishedOf(const std::vector<BenchMesoRow>& rows);
 
 /// Returns the methods with a knob that qualifies, by asset in the order of the rows.

@@ -40,6 +40,7 @@ MesoJudged judgeMeso(const std::vector<MarchResult>& results, const std::vector<
     for (size_t i = 0; i < counts.size(); ++i) judged.fractions[i] = counted > 0 ? counts[i] / counted : 0;
     judged.p50 = upperQuantile(errors, 0.5), judged.p95 = upperQuantile(errors, 0.95),
     judged.p99 = upperQuantile(errors, 0.99), judged.max = upperQuantile(errors, 1);
+    judged.hasNormals = !angles.empty();
     judged.normalP50 = upperQuantile(angles, 0.5), judged.normalP95 = upperQuantile(angles, 0.95);
     return judged;
 }

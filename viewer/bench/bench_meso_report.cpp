@@ -34,7 +34,9 @@ Json toJson(const BenchMesoRow& row) {
     for (size_t i = 0; i < kMesoClassNames.size(); ++i) json[std::string(kMesoClassNames[i])] = row.shape.fractions[i];
     json["p50_texels"] = row.shape.p50, json["p95_texels"] = row.shape.p95, json["p99_texels"] = row.shape.p99,
     json["max_texels"] = row.shape.max;
-    json["normal_p50_degrees"] = row.shape.normalP50, json["normal_p95_degrees"] = row.shape.normalP95;
+    const auto normal = [&](double value) { return row.shape.hasNormals ? Json(value) : Json(); };
+    json["normal_p50_degrees"] = normal(row.shape.normalP50);
+    json["normal_p95_degrees"] = normal(row.shape.normalP95);
     // Columns are the same for all rows.
     const auto solver = [&](double value) { return row.hasSolver ? Json(value) : Json(); };
     json["solver_missed"] = solver(row.solver.fraction(MesoClass::Missed));
@@ -76,6 +78,37 @@ std::string plotOf(const std::vector<const BenchMesoRow*>& rows, std::string tit
     return plotSvg(plot);
 }
 
+/// A ratio that a paper prints, and of what it is here.
+struct Ratio {
+    const char *what, *method, *knob, *baseMethod, *baseKnob;
+    double least, most;
+    bool isOfRefinements = false;
+};
+constexpr Ratio kRatios[] = {
+    {"Table 1: DDM 2x1 over distance map", "ddm", "2x1 grid 64", "dm", "grid 64", 0.705, 0.855},
+    {"Table 1: DDM 4x1 over distance map", "ddm", "4x1 grid 64", "dm", "grid 64", 0.636, 0.735},
+    {"Table 1: DDM 8x1 over distance map", "ddm", "8x1 grid 64", "dm", "grid 64", 0.614, 0.709},
+    {"Table 2: distance map 128 over relief mapping", "dm", "grid 128", "relief-binary", "steps 32", 0.38, 1.05},
+    {"Table 2: DDM 4x1 128 over relief mapping", "ddm", "4x1 grid 128", "relief-binary", "steps 32", 0.10, 0.42},
+    {"Table 2: DDM 4x1 over distance map, 128", "ddm", "4x1 grid 128", "dm", "grid 128", 0.22, 0.50},
+    {"Table 2: DDM 4x1 over distance map, 128, cap 1", "ddm", "4x1 grid 128 cap 1", "dm", "grid 128 cap 1", 0.22, 0.50},
+    {"Table 2: DDM with quadrics 16 over relief mapping", "ddm-quadric-fitted", "4x1 grid 16", "relief-binary",
+     "steps 32", 0.34, 2.10},
+    {"Table 2: DDM with quadrics 16 over distance map 128", "ddm-quadric-fitted", "4x1 grid 16", "dm", "grid 128", 0.89,
+     2.4},
+    {"Table 3: DDM 4x1, compressed over not", "ddm-compressed", "4x1 grid 64", "ddm", "4x1 grid 64", 1, 1.05},
+    {"Risser: binary over secant, 5 steps", "relief-binary", "steps 5", "relief-secant", "steps 5", 5.0 / 3, 8.0 / 2,
+     true},
+    {"Wang: rate of GDM over VDM", "vdm", "rank 16 grid 32", "gdm", "rank 16 grid 32", 0.630, 0.686},
+    {"Wang: rate of GDM over slices, 64 x 64 x 16", "slices", "grid 64 layers 16", "gdm", "rank 16 grid 32 layers 16",
+     1.88, 1.88},
+    {"Wang: rate of GDM over slices, 64 x 64 x 32", "slices", "grid 64 layers 32", "gdm", "rank 16 grid 32 layers 32",
+     3.8, 3.8},
+    {"Wang: rate of GDM, 32 layers over 16", "gdm", "rank 16 grid 32 layers 16", "gdm", "rank 16 grid 32 layers 32",
+     0.95, 0.95},
+    {"Wang: rate of slices, 32 layers over 16", "slices", "grid 64 layers 16", "slices", "grid 64 layers 32", 0.47,
+     0.47}};
+
 /// The cost of a method on an asset, summed over the views; count 0 where it was not measured.
 struct Cost {
     double ratio = 0, fetches = 0, tests = 0, count = 0;
@@ -93,36 +126,13 @@ Cost costOf(const std::vector<BenchMesoRow>& rows, const std::string& asset, std
 
 }  // namespace
 
+bool isOfPublished(std::string_view method, std::string_view knob) {
+    return std::ranges::any_of(kRatios, [&](const Ratio& r) {
+        return (method == r.method && knob == r.knob) || (method == r.baseMethod && knob == r.baseKnob);
+    });
+}
+
 std::vector<MesoPublished> publishedOf(const std::vector<BenchMesoRow>& rows) {
-    struct Ratio {
-        const char *what, *method, *knob, *baseMethod, *baseKnob;
-        double least, most;
-        bool isOfRefinements = false;
-    };
-    constexpr Ratio kRatios[] = {
-        {"Table 1: DDM 2x1 over distance map", "ddm", "2x1 grid 64", "dm", "grid 64", 0.705, 0.855},
-        {"Table 1: DDM 4x1 over distance map", "ddm", "4x1 grid 64", "dm", "grid 64", 0.636, 0.735},
-        {"Table 1: DDM 8x1 over distance map", "ddm", "8x1 grid 64", "dm", "grid 64", 0.614, 0.709},
-        {"Table 2: distance map 128 over relief mapping", "dm", "grid 128", "relief-binary", "steps 32", 0.38, 1.05},
-        {"Table 2: DDM 4x1 128 over relief mapping", "ddm", "4x1 grid 128", "relief-binary", "steps 32", 0.10, 0.42},
-        {"Table 2: DDM 4x1 over distance map, 128", "ddm", "4x1 grid 128", "dm", "grid 128", 0.22, 0.50},
-        {"Table 2: DDM 4x1 over distance map, 128, cap 1", "ddm", "4x1 grid 128 cap 1", "dm", "grid 128 cap 1", 0.22,
-         0.50},
-        {"Table 2: DDM with quadrics 16 over relief mapping", "ddm-quadric-fitted", "4x1 grid 16", "relief-binary",
-         "steps 32", 0.34, 2.10},
-        {"Table 2: DDM with quadrics 16 over distance map 128", "ddm-quadric-fitted", "4x1 grid 16", "dm", "grid 128",
-         0.89, 2.4},
-        {"Risser: binary over secant, 5 steps", "relief-binary", "steps 5", "relief-secant", "steps 5", 5.0 / 3,
-         8.0 / 2, true},
-        {"Wang: rate of GDM over VDM", "vdm", "rank 16 grid 32", "gdm", "rank 16 grid 32", 0.630, 0.686},
-        {"Wang: rate of GDM over slices, 64 x 64 x 16", "slices", "grid 64 layers 16", "gdm",
-         "rank 16 grid 32 layers 16", 1.88, 1.88},
-        {"Wang: rate of GDM over slices, 64 x 64 x 32", "slices", "grid 64 layers 32", "gdm",
-         "rank 16 grid 32 layers 32", 3.8, 3.8},
-        {"Wang: rate of GDM, 32 layers over 16", "gdm", "rank 16 grid 32 layers 16", "gdm", "rank 16 grid 32 layers 32",
-         0.95, 0.95},
-        {"Wang: rate of slices, 32 layers over 16", "slices", "grid 64 layers 16", "slices", "grid 64 layers 32", 0.47,
-         0.47}};
     std::vector<std::string> assets;
     for (const BenchMesoRow& row : rows)
         if (std::ranges::find(assets, row.asset) == assets.end()) assets.push_back(row.asset);
@@ -216,6 +226,35 @@ std::string benchMesoJson(const BenchMesoReport& report) {
                           {"flip_mean", l.flipMean},
                           {"energy", l.energy},
                           {"bytes", l.bytes}});
+    Json prisms = Json::array();
+    for (const MesoPrisms& p : report.prisms) {
+        Json row = {{"turn_degrees", p.turnDegrees},
+                    {"height_over_radius", p.heightOverRadius},
+                    {"prisms", p.prisms},
+                    {"cut_columns", p.cutColumns},
+                    {"rays", p.rays},
+                    {"between", p.between}};
+        for (const auto& [name, d] :
+             {std::pair("straight", p.straight), std::pair("tetrahedra", p.linear),
+              std::pair("straight_smooth", p.straightSmooth), std::pair("tetrahedra_smooth", p.linearSmooth),
+              std::pair("curved_smooth", p.curvedSmooth)})
+            row[std::string(name) + "_p50_texels"] = d.p50, row[std::string(name) + "_p95_texels"] = d.p95;
+        row["printed_exit_wrong"] = p.printedWrong;
+        prisms.push_back(row);
+    }
+    Json models = Json::array();
+    for (const MesoModel& m : report.models)
+        models.push_back({{"asset", m.asset},
+                          {"base", m.base},
+                          {"method", m.method},
+                          {"light", m.light},
+                          {"device", m.device},
+                          {"prisms", m.prisms},
+                          {"pixels", m.pixels},
+                          {"unresolved", m.unresolved},
+                          {"ms_frame", m.msFrame},
+                          {"ns_pixel", m.nsPixel},
+                          {"ns_prism", m.nsPrism}});
     Json remeshed = Json::array();
     for (const RemeshRow& row : report.remeshed)
         remeshed.push_back({{"asset", row.asset},
@@ -251,8 +290,10 @@ std::string benchMesoJson(const BenchMesoReport& report) {
                             {"triangles", row.triangles},
                             {"ms", row.ms},
                             {"processor_ms", row.processorMs}});
-    return Json{{"rows", rowsOf(report)}, {"headline", headlines},        {"checks", checks},
-                {"published", published}, {"factors", factors},           {"lights", lights},
+    return Json{{"rows", rowsOf(report)}, {"headline", headlines},
+                {"checks", checks},       {"published", published},
+                {"factors", factors},     {"lights", lights},
+                {"prisms", prisms},       {"models", models},
                 {"remeshed", remeshed},   {"remeshed_pictures", pictures}}
         .dump();
 }
@@ -309,6 +350,25 @@ std::string benchMesoMarkdown(const BenchMesoReport& report) {
         for (const MesoLight& l : report.lights)
             text += fmt::format("| {} | {} | {} | {:.4f} | {:.4f} | {:.3f} | {:.2f} |\n", l.asset, l.sky, l.form,
                                 l.relativeMse, l.flipMean, l.energy, double(l.bytes) * 1e-6);
+    }
+    if (!report.prisms.empty()) {
+        text +=
+            "\n| a prism turns | slab over radius | prisms | straight from curved, p50, p95 texels | tetrahedra from "
+            "curved | straight from smooth | tetrahedra from smooth | curved from smooth | printed exit wrong % "
+            "|\n|---|---|---|---|---|---|---|---|---|\n";
+        const auto both = [](const MesoDistortion& d) { return fmt::format("{:.3f}, {:.3f}", d.p50, d.p95); };
+        for (const MesoPrisms& p : report.prisms)
+            text += fmt::format("| {:.3g}° | {:.3f} | {} | {} | {} | {} | {} | {} | {:.1f} |\n", p.turnDegrees,
+                                p.heightOverRadius, p.prisms, both(p.straight), both(p.linear), both(p.straightSmooth),
+                                both(p.linearSmooth), both(p.curvedSmooth), 100 * p.printedWrong);
+    }
+    if (!report.models.empty()) {
+        text +=
+            "\n| model | method | light | prisms | covered pixels | ms | ns a pixel | ns a prism | unresolved "
+            "|\n|---|---|---|---|---|---|---|---|---|\n";
+        for (const MesoModel& m : report.models)
+            text += fmt::format("| {} on {} | {} | {} | {} | {} | {:.1f} | {:.0f} | {:.0f} | {} |\n", m.asset, m.base,
+                                m.method, m.light, m.prisms, m.pixels, m.msFrame, m.nsPixel, m.nsPrism, m.unresolved);
     }
     if (!report.remeshed.empty()) {
         text +=

@@ -293,8 +293,13 @@ RunCommand addBenchMeso(CLI::App& bench) {
     app->add_flag(
         "--light", options.light,
         "Also compare light from everywhere on a tile, and on two bases, in the three skies, with a path tracer");
+    app->add_flag("--prisms", options.prisms,
+                  "Also measure what maps from prisms to the tile distort: one line, tetrahedra, the curved path");
+    app->add_flag("--models", options.models,
+                  "Also time frames of six models that the paper prints rates of, a covered pixel and a prism, by the "
+                  "host or on the device");
     app->add_flag("--published", options.published,
-                  "Beside the ratios of the paper's tables (with --sweep, for those of times)");
+                  "Beside the ratios of the papers' tables, each method at the knobs that these are of");
     app->add_option("--remesh", command->remesh,
                     "Remeshing of the height fields as well: error in pixels, vertices and time, by cell and filter; "
                     "sweep, or tessellation: beside it, by a device's tessellator [sweep]")

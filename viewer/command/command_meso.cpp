@@ -33,7 +33,8 @@ struct BuildMeso {
     int texels = 256, samples = 2;
     uint32_t seed = 1;
     double cap = 0.25;
-    bool noBoxes = false, noPatches = false, overwrite = false, guesses = false, noVisibility = false;
+    bool onlyHeights = false, noBoxes = false, noPatches = false, overwrite = false, guesses = false,
+         noVisibility = false;
     std::string gdm, directions = "16x32";
     int rank = 16, bits = 16;
     int transfer = 0;  // cells along x; 0: none
@@ -225,6 +226,18 @@ std::string summary(const std::string& file, uint64_t fileBytes, const Asset& a)
     return text;
 }
 
+Result<int> writeBuilt(const BuildMeso& command, const Asset& asset, const OutputRules& rules,
+                       std::chrono::steady_clock::time_point start) {
+    VCP_TRY_ASSIGN(const auto bytes, writeAsset(command.out, asset, rules));
+    Json json = toJson(command.out, bytes, asset);
+    json["seconds"] = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    if (command.report.json)
+        VCP_TRY(printJson(json));
+    else
+        VCP_TRY(printLine(summary(command.out, bytes, asset)));
+    return 0;
+}
+
 Result<int> runBuild(const BuildMeso& command) {
     const auto start = std::chrono::steady_clock::now();
     VCP_TRY_ASSIGN(auto options, optionsOf(command));
@@ -236,6 +249,11 @@ Result<int> runBuild(const BuildMeso& command) {
         if (error.file.empty() && error.code != ErrorCode::Usage) error.file = command.source;
         return error;
     };
+    if (command.onlyHeights) {
+        if (!asset.heights) return wrong("--only-heights is for height maps");
+        asset.extent = asset.heights->extent();
+        return writeBuilt(command, asset, rules, start);
+    }
     // The shape gives the extent, by which --grid N is measured.
     const auto shape = shapeOf(asset);
     if (!shape) return named(shape.error());
@@ -255,14 +273,7 @@ Result<int> runBuild(const BuildMeso& command) {
     if (options.transfer) options.transfer->shareOut = sharedOut("light");
     if (const auto built = buildAsset(asset, options); !built) return named(built.error());
     display.finish();
-    VCP_TRY_ASSIGN(const auto bytes, writeAsset(command.out, asset, rules));
-    Json json = toJson(command.out, bytes, asset);
-    json["seconds"] = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-    if (command.report.json)
-        VCP_TRY(printJson(json));
-    else
-        VCP_TRY(printLine(summary(command.out, bytes, asset)));
-    return 0;
+    return writeBuilt(command, asset, rules, start);
 }
 
 Result<int> runInfo(const InfoMeso& command) {
@@ -297,7 +308,7 @@ RunCommand addMesoBuild(CLI::App& meso) {
     app->add_option("--texels", command->texels, "Texels an edge of a procedural height field")
         ->type_name("N")
         ->capture_default_str()
-        ->check(CLI::Range(8, kMaxGridEdge));
+        ->check(CLI::Range(8, kMaxMapEdge));
     app->add_option("--seed", command->seed, "Of procedural ones")->type_name("N")->capture_default_str();
     app->add_option("--grid", command->grid, "Cells: 64 along x, or 64x64x16")->type_name("N")->capture_default_str();
     app->add_option("--samples", command->samples, "Samples of a solid's distance a cell, along each axis")
@@ -323,6 +334,9 @@ RunCommand addMesoBuild(CLI::App& meso) {
                     "Points of the quadrics: found on the cells' edges, or of fitted quadrics as published")
         ->capture_default_str()
         ->check(CLI::IsMember({"direct", "fitted"}));
+    app->add_flag("--only-heights", command->onlyHeights,
+                  "Of a height map nothing but its heights: all that the method remesh needs, and the only way above "
+                  "4096 texels along an edge");
     app->add_flag("--no-boxes", command->noBoxes, "Without octant boxes");
     app->add_flag("--no-patches", command->noPatches, "Without quadrics");
     app->add_option("--gdm", command->gdm,

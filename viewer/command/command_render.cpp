@@ -172,7 +172,7 @@ Result<void> checkHost(const RenderCommand& command) {
 
 /// Draws all inputs together, into one picture or a sequence. Returns its figures, for --json.
 Result<Json> render(const RenderCommand& command) {
-    VCP_TRY_ASSIGN(const auto open,
+    VCP_TRY_ASSIGN(auto open,
                    openSceneShown(command.inputs, command.build, command.render.source, command.report.progressStyle(),
                                   {command.methods.empty() ? "" : command.methods[0], command.subdivide}));
     if ((!command.methods.empty() || command.subdivide) && open.file.surfaces.empty())
@@ -195,6 +195,7 @@ Result<Json> render(const RenderCommand& command) {
     RendererOptions options = command.render.rendererOptions();
     options.validation = command.validation;
     VCP_TRY_ASSIGN(auto renderer, createPictureRenderer(options));
+    reportMeasuring(open.surfaces.surfaces, command.report.progressStyle());
     VCP_TRY(renderer->open(open.placed(), open.surfaces.surfaces));
 
     const FrameRequest request = requestFor(command, open, camera, bounds);

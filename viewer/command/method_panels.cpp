@@ -45,7 +45,9 @@ Json toJson(const MethodPanel& panel) {
             {"iterations_mean", panel.iterationsMean.value_or(0)},
             {"unresolved_rays", panel.stats.unresolvedRays},
             {"far_hits", panel.stats.farHits},
-            {"surface_bytes", panel.stats.surfaceBytes}};
+            {"surface_bytes", panel.stats.surfaceBytes},
+            {"remeshed_pixels", panel.stats.remeshedPixels},
+            {"uncertified_patches", panel.stats.uncertifiedPatches}};
 }
 
 std::string summary(const MethodPanel& panel) {

@@ -21,6 +21,7 @@ inline constexpr SettingName kOptionNames[] = {
     {"another axis up", "--up"},
     {"how far it repeats", "--period"},
     {"take a Vulkan device", "--device"},
+    {"heights alone", "--only-heights"},
 };
 
 }  // namespace vcp

@@ -68,6 +68,9 @@ struct RenderCommand {
 
 using PaintRows = decltype(PictureSequenceOptions::paintOver);
 
+/// Has what remeshed surfaces measure for a view shown where it takes long, and end where a person interrupts it.
+void reportMeasuring(std::span<MesoSurface> surfaces, ProgressStyle style);
+
 /// Errors: Device, where Vulkan's validation layers said something.
 Result<void> checkValidation(const PictureRenderer& renderer);
 

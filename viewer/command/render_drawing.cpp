@@ -8,12 +8,14 @@
 
 #include "builder/measure/quantile.h"
 #include "render/pixel_samples.h"
+#include "viewer/asset/share_out.h"
 #include "viewer/command/method_panels.h"
 #include "viewer/command/parsed_option.h"
 #include "viewer/command/render_command.h"
 #include "viewer/command/terminal/interrupt.h"
 #include "viewer/picture/image_files.h"
 #include "viewer/scene/option_values.h"
+#include "viewer/viewer.h"
 
 namespace vcp {
 
@@ -114,6 +116,8 @@ Json toJson(const Drawing& drawing, const DeviceInfo& device, const FrameRequest
             {"unresolved_rays", stats.unresolvedRays},
             {"far_hits", stats.farHits},
             {"surface_bytes", stats.surfaceBytes},
+            {"remeshed_pixels", stats.remeshedPixels},
+            {"uncertified_patches", stats.uncertifiedPatches},
             {"device", castBy(device, stats.onHost)},
             {"software", device.software},
             {"settled", drawing.update.settled},
@@ -131,8 +135,11 @@ Json toJson(const Drawing& drawing, const DeviceInfo& device, const FrameRequest
 std::string summary(const RenderCommand& command, const Drawing& drawing, const DeviceInfo& device,
                     double askedPixels) {
     const UpdateResult& update = drawing.update;
-    std::string error = std::isfinite(update.errorPixels) ? fmt::format("error {:.2g} pixels", update.errorPixels)
-                                                          : "no certified error";
+    const std::string remeshed = remeshedText(drawing.stats);
+    std::string error;
+    if (std::isfinite(update.errorPixels)) error = fmt::format("error {:.2g} pixels", update.errorPixels);
+    if (!remeshed.empty()) error += (error.empty() ? "remeshed " : ", remeshed ") + remeshed;
+    if (error.empty()) error = "no certified error";
     if (update.colourPixels > 0) error += fmt::format(", colours off within {:.2g}", update.colourPixels);
     const std::string samples = drawing.samples > 1 ? fmt::format(", {} samples in {}", drawing.samples,
                                                                   formatSeconds(1e-3 * drawing.samplesMs))
@@ -173,6 +180,8 @@ Json toJson(const TiledPictureStats& total, size_t pictures, uint32_t samples, c
             {"samples", samples},
             {"rays", total.rays},
             {"hit_pixels", total.hitPixels},
+            {"remeshed_pixels", total.remeshedPixels},
+            {"uncertified_patches", total.uncertifiedPatches},
             {"device", castBy(device, total.onHost)},
             {"software", device.software},
             {"settled", total.update.settled},
@@ -193,6 +202,21 @@ void warnOfEmptyPicture(uint64_t hits, const FrameRequest& request) {
 
 }  // namespace
 
+void reportMeasuring(std::span<MesoSurface> surfaces, ProgressStyle style) {
+    for (MesoSurface& surface : surfaces)
+        surface.remeshed.options.shareOut = [style](size_t count,
+                                                    const std::function<void(size_t first, size_t last)>& fill) {
+            // Only a first view measures for long.
+            constexpr std::chrono::milliseconds kSilent(500);
+            const auto began = std::chrono::steady_clock::now();
+            ProgressDisplay display(style, stderr);
+            return shareOut(count, fill, [&](double part) {
+                if (std::chrono::steady_clock::now() - began > kSilent) display.update("measuring heights", part);
+                return !interrupted();
+            });
+        };
+}
+
 Result<void> checkValidation(const PictureRenderer& renderer) {
     const std::vector<std::string> problems = renderer.validationMessages();
     return problems.empty() ? Result<void>() : Error{.code = ErrorCode::Device, .message = problems.front()};
@@ -208,6 +232,7 @@ Result<Json> drawOne(PictureRenderer& renderer, const FrameRequest& request, con
     for (const std::string& method : methods) {
         if (first) {
             VCP_TRY_ASSIGN(auto surfaces, surfacesBy(method, scene));
+            reportMeasuring(surfaces.surfaces, command.report.progressStyle());
             VCP_TRY(renderer.setSurfaces(surfaces.surfaces));
         }
         VCP_TRY_ASSIGN(auto drawing, draw(renderer, request, command));

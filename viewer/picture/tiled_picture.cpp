@@ -98,6 +98,8 @@ void TiledPicture::begin(const FrameStats& tile) {
     tileHits_ = tile.hitPixels;
     stats_.rays += tile.rays;
     stats_.ms += tile.msFrame;
+    stats_.remeshedPixels = std::max(stats_.remeshedPixels, tile.remeshedPixels);
+    stats_.uncertifiedPatches = std::max(stats_.uncertifiedPatches, tile.uncertifiedPatches);
     stats_.onHost = tile.onHost;
 }
 

@@ -38,8 +38,10 @@ struct TiledPictureStats {
     uint64_t tiles = 0, rays = 0, hitPixels = 0;
     double ms = 0;  ///< time of drawing alone, of each tile's last frame and its samples, as are the rays
     double errorPixels = 0, colourPixels = 0;  ///< largest over the tiles
-    UpdateResult update;                       ///< the last tile's
-    bool onHost = false;                       ///< likewise, as in FrameStats
+    double remeshedPixels = 0;                 ///< likewise, as in FrameStats, and the next
+    uint64_t uncertifiedPatches = 0;
+    UpdateResult update;  ///< the last tile's
+    bool onHost = false;  ///< likewise, as in FrameStats
 };
 
 /// A picture in the making, tile by tile. What it is given must stay until it is done.

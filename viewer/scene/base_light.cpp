@@ -10,6 +10,7 @@
 #include <utility>
 
 #include <fmt/format.h>
+#include <glm/common.hpp>
 
 #include "builder/measure/mesh_bvh.h"
 #include "octree/io/content_hash.h"
@@ -121,8 +122,9 @@ Result<Traced> trace(const BaseScene& scene, const Ranges& ranges, BaseTransferO
         if (!hit) return std::nullopt;
         return BaseHit{hit->triangle, hit->t};
     };
-    options.shareOut = [&](size_t count, const auto& fill) {
-        return shareOut(count, fill, [&](double part) { return !progress || progress(part); });
+    options.shareOut = [&](size_t count, const auto& fill, BaseTransferOptions::Part of) {
+        return shareOut(count, fill,
+                        [&](double part) { return !progress || progress(glm::mix(of.before, of.after, part)); });
     };
     return meso::traceBaseTransfer(scene, ranges, options);
 }

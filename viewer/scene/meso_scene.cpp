@@ -12,6 +12,7 @@
 #include "mesostructure/base/surface_edges.h"
 #include "mesostructure/remesh/remesher.h"
 #include "mesostructure/solids.h"
+#include "viewer/asset/share_out.h"
 #include "viewer/scene/base_light.h"
 #include "viewer/scene/base_mesh.h"
 #include "viewer/scene/mesh_cache.h"
@@ -24,8 +25,14 @@ using namespace meso;
 namespace {
 
 constexpr int kTexels = 256;
+// Levels of larger maps are averages: least volumes would take minutes.
+constexpr size_t kMostFittedTexels = size_t{1} << 20;
 
-Result<std::shared_ptr<const MarchArrays>> arraysOf(const Asset& asset, const MethodOptions& options) {
+Result<std::shared_ptr<const MarchArrays>> arraysOf(const Asset& asset, MethodOptions options,
+                                                    const SurfaceProgress& progress) {
+    options.shareOut = [&](size_t count, const auto& fill) {
+        return shareOut(count, fill, [&](double part) { return !progress || progress("displacement map", part); });
+    };
     VCP_TRY_ASSIGN(const auto shape, shapeOf(asset));
     VCP_TRY_ASSIGN(const auto method, buildMethod(asset, *shape, options));
     VCP_TRY_ASSIGN(auto arrays, method.arrays());
@@ -81,7 +88,8 @@ private:
 /// Makes remeshed surfaces; the levels of a height field are made once.
 class Remeshing {
 public:
-    Result<MesoSurface> make(const MesoSurfaceDescription& d, const Asset& asset, const BaseSurface& base) {
+    /// Takes the asset's heights.
+    Result<MesoSurface> make(const MesoSurfaceDescription& d, Asset& asset, const BaseSurface& base) {
         if (!asset.heights)
             return Error{.code = ErrorCode::Usage,
                          .message = fmt::format("{} is for height fields; {} is a solid", kRemeshMethod, asset.name)};
@@ -94,12 +102,13 @@ public:
                          .message = fmt::format("{} takes no normal texture: leave it out, or take another method",
                                                 kRemeshMethod)};
         // Certified cells take heights from the map, and of coarser levels normals alone.
-        const LevelFit fit = d.errorPixels > 0 ? LevelFit::Averaged : LevelFit::Least;
+        const bool isLarge = asset.heights->texels.size() > kMostFittedTexels;
+        const LevelFit fit = d.errorPixels > 0 || isLarge ? LevelFit::Averaged : LevelFit::Least;
         auto& levels = levels_[{d.asset, d.withFilter, fit}];
         if (!levels) {
             LevelFitOptions options{.fit = fit};
             if (!d.withFilter) options.mostLevels = 1;
-            VCP_TRY_ASSIGN(auto made, HeightLevels::build(*asset.heights, options));
+            VCP_TRY_ASSIGN(auto made, HeightLevels::build(std::move(*asset.heights), options));
             levels = std::make_shared<const HeightLevels>(std::move(made));
         }
         auto made =
@@ -111,7 +120,11 @@ public:
         }
         MesoSurface surface;
         surface.remeshed = {std::make_shared<const RemeshSurface>(*std::move(made)),
-                            {.cell = d.cell, .errorPixels = d.errorPixels}};
+                            {.cell = d.cell,
+                             .errorPixels = d.errorPixels,
+                             .shareOut = [](size_t count, const std::function<void(size_t first, size_t last)>& fill) {
+                                 return shareOut(count, fill, {});
+                             }}};
         return surface;
     }
 
@@ -151,18 +164,22 @@ public:
         bases_.back().isAsked = isAsking(d);
         return {};
     }
-    /// Gives its transfer to each surface that asks for it.
-    void trace(std::span<const MesoSurfaceDescription> descriptions, MesoScene& scene) const {
-        if (bases_.empty()) return;
+    /// Gives its transfer to each surface that asks for it. Errors: Cancelled.
+    Result<void> trace(std::span<const MesoSurfaceDescription> descriptions, MesoScene& scene,
+                       const SurfaceProgress& progress) const {
+        if (bases_.empty()) return {};
         const auto cache = defaultCacheFolder();
-        const auto traced = traceBases(bases_, cache ? *cache : std::filesystem::path());
+        const auto traced = traceBases(bases_, cache ? *cache : std::filesystem::path(),
+                                       [&](double part) { return !progress || progress("light of bases", part); });
         if (!traced) {
+            if (traced.error().code == ErrorCode::Cancelled) return traced.error();
             scene.warnings.push_back(traced.error().message + "; the bases do not shade each other");
-            return;
+            return {};
         }
         size_t next = 0;
         for (size_t i = 0; i < descriptions.size(); ++i)
             if (descriptions[i].path.points.empty()) scene.surfaces[i].baseTransfer = (*traced)[next++];
+        return {};
     }
 
 private:
@@ -186,8 +203,9 @@ void warn(const MesoSurfaceDescription& d, const BaseSurface& base, const Shell&
     say(shell.withoutArea, "triangles without area are left out");
     say(shell.withoutMap, "triangles whose texture coordinates have no area: the mesostructure is smeared there");
     say(shell.flat, "pieces of the shell have no volume and are left out: faces on their own backs have no outside");
-    say(shell.inverted,
-        "pieces of the shell are turned inside out: the surface bends more sharply than the mesostructure is high");
+    say(shell.cut,
+        "columns of the shell are cut: the surface bends more sharply inwards than the mesostructure is high");
+    say(shell.inverted, "pieces of the shell are turned inside out: the surface folds there");
 }
 
 }  // namespace
@@ -252,7 +270,7 @@ Result<Asset> openMesoAsset(const std::string& name) {
     return asset;
 }
 
-Result<MesoScene> makeMesoScene(std::span<const MesoSurfaceDescription> descriptions) {
+Result<MesoScene> makeMesoScene(std::span<const MesoSurfaceDescription> descriptions, const SurfaceProgress& progress) {
     MesoScene scene;
     Textures textures;
     Remeshing remeshing;
@@ -260,9 +278,11 @@ Result<MesoScene> makeMesoScene(std::span<const MesoSurfaceDescription> descript
     std::map<std::string, Transfer> transfers;  // an asset is read once for each surface, and kept once
     SceneBases bases(descriptions);
     for (const MesoSurfaceDescription& d : descriptions) {
+        const double part = double(scene.paths.size()) / double(descriptions.size());
+        if (progress && !progress("mesostructure", part)) return Error::cancelled();
         SurfacePath& path = scene.paths.emplace_back(d.path);
         for (glm::dvec3& point : path.points) point -= d.place;
-        const auto asset = openMesoAsset(d.asset);
+        auto asset = openMesoAsset(d.asset);
         if (!asset) return d.from.blamed(asset.error());
         const auto base = baseOf(d);
         if (!base) return d.from.blamed(base.error());
@@ -279,9 +299,10 @@ Result<MesoScene> makeMesoScene(std::span<const MesoSurfaceDescription> descript
             scene.surfaces.push_back(*std::move(surface));
             continue;
         }
-        auto arrays = arraysOf(*asset, d.method);
+        auto arrays = arraysOf(*asset, d.method, progress);
         if (!arrays) {
             Error error = arrays.error();
+            if (error.code == ErrorCode::Cancelled) return error;
             if (error.file.empty() && error.code != ErrorCode::Usage) error.file = d.asset;
             return d.from.blamed(std::move(error));
         }
@@ -314,7 +335,7 @@ Result<MesoScene> makeMesoScene(std::span<const MesoSurfaceDescription> descript
         surface.withBase = d.withBase;
         scene.surfaces.push_back(std::move(surface));
     }
-    bases.trace(descriptions, scene);
+    VCP_TRY(bases.trace(descriptions, scene, progress));
     return scene;
 }
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -95,7 +96,12 @@ double periodOf(std::span<const SurfacePath> paths);
 /// Returns FrameRequest::surfacesMoved at a time from 0 on; empty where nothing moves.
 std::vector<glm::dvec3> surfacesMovedAt(std::span<const SurfacePath> paths, double time);
 
-/// Makes the surfaces. Errors: those of the assets, methods, bases and shells, with the file where there is one.
-Result<MesoScene> makeMesoScene(std::span<const MesoSurfaceDescription> descriptions);
+/// Is told what is being made, and how far it is, from 0 to 1; false cancels. May be empty.
+using SurfaceProgress = std::function<bool(const char* stage, double part)>;
+
+/// Makes the surfaces. Errors: those of the assets, methods, bases and shells, with the file where there is one;
+/// Cancelled, between two surfaces and while a displacement map or light between their bases is traced.
+Result<MesoScene> makeMesoScene(std::span<const MesoSurfaceDescription> descriptions,
+                                const SurfaceProgress& progress = {});
 
 }  // namespace vcp

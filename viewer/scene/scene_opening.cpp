@@ -93,7 +93,8 @@ std::vector<PlacedDataset> OpenedScene::placed() const {
 }
 
 Result<OpenedScene> openScene(SceneFile file, const std::string& name,
-                              const std::function<Result<OpenDataset>(const std::string& file)>& open, bool leavesOut) {
+                              const std::function<Result<OpenDataset>(const std::string& file)>& open, bool leavesOut,
+                              const SurfaceProgress& progress) {
     OpenedScene scene;
     scene.file = std::move(file);
     std::vector<SceneDataset> kept;
@@ -110,7 +111,7 @@ Result<OpenedScene> openScene(SceneFile file, const std::string& name,
     }
     if (kept.empty() && !scene.leftOut.empty()) return scene.leftOut.front().why;
     scene.file.datasets = std::move(kept);
-    VCP_TRY_ASSIGN(scene.surfaces, makeMesoScene(scene.file.surfaces));
+    VCP_TRY_ASSIGN(scene.surfaces, makeMesoScene(scene.file.surfaces, progress));
     if (scene.file.environment) {
         VCP_TRY_ASSIGN(scene.environment, openEnvironment(*scene.file.environment));
     }
@@ -158,7 +159,10 @@ Result<OpenedScene> openScene(const std::vector<std::string>& inputs, const Buil
         addSideFiles({each});
         return openDataset(path.string(), access);
     };
-    auto scene = openScene(std::move(file), inputs.front(), open, leavesOut && kind == InputKind::Datasets);
+    const auto told = [&](const char* stage, double part) {
+        return !build.progress || build.progress({.stage = stage, .fraction = part});
+    };
+    auto scene = openScene(std::move(file), inputs.front(), open, leavesOut && kind == InputKind::Datasets, told);
     if (scene) scene->filesRead = std::move(filesRead);
     return scene;
 }

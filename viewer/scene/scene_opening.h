@@ -78,11 +78,11 @@ struct OpenedScene {
 };
 
 /// Opens the datasets of a scene, each by `open`, which is given its file, and makes its surfaces. `name` stands for
-/// the scene in errors. `leavesOut`: what cannot be opened is left out, while there is one dataset that can. Errors:
-/// those of `open` and makeMesoScene; InvalidInput, where they lie too far apart.
+/// the scene in errors. `leavesOut`: what cannot be opened is left out, while there is one dataset that can.
+/// `progress`: of the surfaces. Errors: those of `open` and makeMesoScene; InvalidInput, where they lie too far apart.
 Result<OpenedScene> openScene(SceneFile file, const std::string& name,
                               const std::function<Result<OpenDataset>(const std::string& file)>& open,
-                              bool leavesOut = false);
+                              bool leavesOut = false, const SurfaceProgress& progress = {});
 
 /// What holds for all surfaces of a scene.
 struct SurfaceChoices {

@@ -15,11 +15,14 @@ Result<OpenedScene> openWanted(const WantedScene& wanted,
         VCP_TRY_ASSIGN(file, readScene(wanted.scenePath));
     }
     const size_t datasets = file.datasets.size();
-    return openScene(std::move(file), wanted.name, [&](const std::string& each) -> Result<OpenDataset> {
-        if (wanted.access.cancelled && wanted.access.cancelled()) return Error::cancelled();
+    const auto isCancelled = [&] { return wanted.access.cancelled && wanted.access.cancelled(); };
+    const auto open = [&](const std::string& each) -> Result<OpenDataset> {
+        if (isCancelled()) return Error::cancelled();
         tell(each, datasets);
         return openDataset(each, wanted.access);
-    });
+    };
+    return openScene(std::move(file), wanted.name, open, false,
+                     [&](const char* /*stage*/, double /*part*/) { return !isCancelled(); });
 }
 
 BackgroundOpening::BackgroundOpening(WantedScene wanted) : wanted_(std::move(wanted)) {

@@ -463,6 +463,7 @@ void Interface::layOutDetails() {
         valueRow(*look_, "Read", formatBytes(update.bytesRead));
     }
     if (status.frame.surfaceBytes > 0) valueRow(*look_, "Mesostructure", formatBytes(status.frame.surfaceBytes));
+    if (const std::string text = remeshedText(status.frame); !text.empty()) valueRow(*look_, "Remeshed", text);
     const uint32_t most = std::max(session_->viewer().mostSamples(), status.samples);
     valueRow(*look_, "Samples", fmt::format("{} of {}", status.samples, most));
     valueRow(*look_, "A picture takes", fmt::format("{:.0f} ms", status.frame.msFrame));

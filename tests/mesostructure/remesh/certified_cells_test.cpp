@@ -5,7 +5,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <set>
+#include <thread>
+#include <vector>
 
 #include <gtest/gtest.h>
 #include <glm/common.hpp>
@@ -309,6 +312,41 @@ TEST(CertifiedCells, SeamsOfOtherTexelsStayClosed) {
         ASSERT_EQ(mesh.counts.culled, 0u);
         EXPECT_EQ(openEdges(mesh), 0u) << distance;
     }
+}
+
+TEST(CertifiedCells, MeasuringThatIsSharedOutOrCancelledChangesNothing) {
+    const RemeshSurface surface = surfaceOf("torus", 2, 0.2, "ridged");
+    const RemeshCamera camera = lookFrom({2, 1, 1.5}, {}, 400);
+    CertifiedCells alone = cellsOf(surface), shared = cellsOf(surface), cancelled = cellsOf(surface);
+    const auto expected = meshOf<float>(alone, camera, {.errorPixels = 0.5});
+    const auto isExpected = [&](const RemeshMesh<float>& mesh) {
+        return mesh.indices == expected.indices && mesh.counts.boundPixels == expected.counts.boundPixels &&
+               mesh.counts.uncertified == expected.counts.uncertified &&
+               std::ranges::equal(mesh.vertices, expected.vertices, [](const auto& a, const auto& b) {
+                   return a.position == b.position && a.normal == b.normal && a.uv == b.uv;
+               });
+    };
+    size_t ranges = 0;
+    const auto inThreads = [&](size_t count, const std::function<void(size_t first, size_t last)>& fill) {
+        std::vector<std::thread> threads;
+        for (size_t first = 0; first < count; first += count / 5 + 1, ++ranges)
+            threads.emplace_back([&fill, first, count] { fill(first, std::min(count, first + count / 5 + 1)); });
+        for (std::thread& thread : threads) thread.join();
+        return true;
+    };
+    EXPECT_TRUE(isExpected(meshOf<float>(shared, camera, {.errorPixels = 0.5, .shareOut = inThreads})));
+    EXPECT_EQ(ranges, 5u);
+    // What was measured until then stays known, and nothing was chosen.
+    const auto halfway = [](size_t count, const std::function<void(size_t first, size_t last)>& fill) {
+        fill(count / 4, count / 2);
+        return false;
+    };
+    RemeshMesh<float> none;
+    const auto refused = remesh(cancelled, camera, {.errorPixels = 0.5, .shareOut = halfway}, none);
+    ASSERT_FALSE(refused.ok());
+    EXPECT_EQ(refused.error().code, ErrorCode::Cancelled);
+    EXPECT_TRUE(none.vertices.empty());
+    EXPECT_TRUE(isExpected(meshOf<float>(cancelled, camera, {.errorPixels = 0.5})));
 }
 
 TEST(CertifiedCells, RefuseWhatTheyCannotCut) {

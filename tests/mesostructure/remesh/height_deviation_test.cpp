@@ -88,6 +88,43 @@ TEST(HeightDeviation, SeesATexelWithinAGreatTriangle) {
     EXPECT_EQ(heightDeviation(levels, {{{{0.5, 0.5}, 0}, {{0.9, 0.5}, 0}, {{0.7, 0.9}, 0}}}), 0);
 }
 
+/// Cells that lie whole in a triangle are measured by their corners: here over hundreds of them, across the map's ends.
+TEST(HeightDeviation, OfManyWholeCellsIsTheMostOfDenseSamples) {
+    for (uint32_t seed = 0; seed < 40; ++seed) {
+        SCOPED_TRACE(seed);
+        std::mt19937 random(seed);
+        const glm::ivec2 size = seed % 2 == 0 ? glm::ivec2(16, 16) : glm::ivec2(13, 6);
+        const HeightLevels levels = noise(size, seed);
+        const dvec2 texels = levels.texels();
+        std::uniform_real_distribution<double> place(-40, 40), height(0, 1);
+        Corners corners;
+        for (HeightCorner& corner : corners) {
+            dvec2 at(place(random), place(random));
+            // Corners on texels, and sides along the map's lines.
+            if (seed % 3 != 0) at = glm::round(at);
+            corner = {at / texels, height(random)};
+        }
+        if (seed % 3 == 1) corners[1].at.y = corners[0].at.y, corners[2].at.x = corners[0].at.x;
+        const double exact = heightDeviation(levels, corners);
+        double most = 0;
+        const dvec2 a = corners[0].at, b = corners[1].at - a, c = corners[2].at - a;
+        const double area = b.x * c.y - b.y * c.x;
+        if (area == 0) continue;
+        // Eight samples along a texel: the texels themselves are among them, and of what is cut the triangle's corners.
+        for (int j = -41 * 8; j <= 41 * 8; ++j)
+            for (int i = -41 * 8; i <= 41 * 8; ++i) {
+                const dvec2 at = dvec2(i, j) / 8.0 / texels, d = at - a;
+                const double v = (d.x * c.y - d.y * c.x) / area, w = (b.x * d.y - b.y * d.x) / area;
+                if (v < 0 || w < 0 || v + w > 1) continue;
+                const double linear = (1 - v - w) * corners[0].height + v * corners[1].height + w * corners[2].height;
+                most = std::max(most, std::abs(levels.height(0, at) - linear));
+            }
+        EXPECT_GE(exact, most - 1e-9);
+        // The map changes by up to 2 over a texel, and no place is farther from a sample than a quarter of one.
+        EXPECT_LE(exact, most + 0.5);
+    }
+}
+
 TEST(HeightDeviation, EndsWhereItIsEnough) {
     const HeightLevels levels = noise({64, 64}, 5);
     const Corners corners{{{{0, 0}, 0.5}, {{1, 0}, 0.5}, {{0, 1}, 0.5}}};

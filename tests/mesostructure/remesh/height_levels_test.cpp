@@ -31,8 +31,8 @@ TEST(HeightLevels, HalveDownToOneHeight) {
     std::vector<glm::ivec2> sizes;
     for (const HeightLevel& level : levels.levels()) {
         sizes.push_back(level.size);
-        EXPECT_EQ(level.heights.size(), size_t(level.size.x) * size_t(level.size.y));
-        for (const float height : level.heights) EXPECT_NEAR(height, 32768 / 65535.0, 1e-6);
+        EXPECT_EQ(level.texels.size(), size_t(level.size.x) * size_t(level.size.y));
+        for (const uint16_t texel : level.texels) EXPECT_EQ(texel, 32768);
     }
     EXPECT_EQ(sizes, (std::vector<glm::ivec2>{{24, 5}, {12, 2}, {6, 1}, {3, 1}, {1, 1}}));
     EXPECT_NEAR(levels.height(2, glm::dvec2(0.3, 0.1)), 32768 / 65535.0, 1e-6);
@@ -69,8 +69,9 @@ TEST(HeightLevels, LeastVolumesAreProvedLeast) {
             EXPECT_GE(volume.fitted, volume.bound - 1e-9);
             EXPECT_LE(volume.fitted - volume.bound, 0.005 * volume.fitted + 1e-9);
             EXPECT_LT(volume.fitted, volume.averaged);
-            EXPECT_NEAR(volume.fitted, levelVolume(least.levels()[0], least.levels()[level]), 1e-9);
-            EXPECT_NEAR(volume.averaged, levelVolume(averaged.levels()[0], averaged.levels()[level]), 1e-9);
+            // Heights are kept in steps of 1 / 65535; means of means are rounded at each level.
+            EXPECT_NEAR(volume.fitted, levelVolume(least.levels()[0], least.levels()[level]), 0.5 / 65535);
+            EXPECT_NEAR(volume.averaged, levelVolume(averaged.levels()[0], averaged.levels()[level]), 1.0 / 65535);
         }
     }
 }
@@ -80,16 +81,17 @@ TEST(HeightLevels, NoSingleHeightImprovesALeastVolume) {
     const HeightLevels levels = levelsOf(mapOf("ridged", 32), {.gap = 1e-4, .mostIterations = 50000});
     const HeightLevel& map = levels.levels()[0];
     const double volume = levels.volumes()[2].fitted;
-    for (size_t i = 0; i < levels.levels()[2].heights.size(); ++i)
-        for (const float by : {-0.02f, 0.02f}) {
+    for (size_t i = 0; i < levels.levels()[2].texels.size(); ++i)
+        for (const int by : {-1311, 1311}) {
             HeightLevel moved = levels.levels()[2];
-            moved.heights[i] += by;
+            const int height = moved.texels[i] + by;
             const int x = int(i) % moved.size.x * 4, y = int(i) / moved.size.x * 4;
-            float least = 1, most = 0;
+            double least = 1, most = 0;
             for (int j = y - 3; j <= y + 3; ++j)
                 for (int k = x - 3; k <= x + 3; ++k)
                     least = std::min(least, map.at(k, j)), most = std::max(most, map.at(k, j));
-            if (moved.heights[i] < least || moved.heights[i] > most) continue;
+            if (height / 65535.0 < least || height / 65535.0 > most) continue;
+            moved.texels[i] = uint16_t(height);
             EXPECT_GE(levelVolume(map, moved), volume * (1 - 1e-3)) << i;
         }
 }
@@ -100,11 +102,34 @@ TEST(HeightLevels, LeastVolumesDoNotOvershoot) {
         const auto [low, high] = std::ranges::minmax(map.texels);
         const HeightLevels levels = levelsOf(map);
         for (const HeightLevel& level : levels.levels())
-            for (const float height : level.heights) {
-                ASSERT_GE(height, low / 65535.0f - 1e-6f) << name;
-                ASSERT_LE(height, high / 65535.0f + 1e-6f) << name;
+            for (const uint16_t texel : level.texels) {
+                ASSERT_GE(texel, low) << name;
+                ASSERT_LE(texel, high) << name;
             }
     }
+}
+
+/// Means of means are the means of the map, where edges halve: a tent is the sum of three tents of half its width.
+TEST(HeightLevels, AveragesAreTheMapsUnderATent) {
+    const HeightMap map = mapOf("ridged");
+    const HeightLevels levels = levelsOf(map, {.fit = LevelFit::Averaged});
+    for (size_t level = 1; level < levels.levels().size(); ++level) {
+        const HeightLevel& of = levels.levels()[level];
+        const int width = 1 << level;
+        for (int j = 0; j < of.size.y; ++j)
+            for (int i = 0; i < of.size.x; ++i) {
+                double sum = 0;
+                for (int y = -width; y <= width; ++y)
+                    for (int x = -width; x <= width; ++x)
+                        sum += map.texel(i * width + x, j * width + y) * (width - std::abs(x)) * (width - std::abs(y));
+                // Half a step of rounding a level.
+                ASSERT_NEAR(of.at(i, j) * 65535, sum / std::pow(width, 4), 0.51 * double(level)) << level;
+            }
+    }
+    const HeightLevel odd = averagedLevel({{5, 1}, {10, 20, 30, 40, 50}}, {2, 1});
+    // Corners lie at texels 0 and 2.5, and a texel counts by 1 less its distance over 2.5.
+    EXPECT_EQ(odd.texels[0], 25);  // (10 + 0.6 * 20 + 0.2 * 30 + 0.2 * 40 + 0.6 * 50) / 2.6
+    EXPECT_EQ(odd.texels[1], 35);  // (0.4 * 20 + 0.8 * 30 + 0.8 * 40 + 0.4 * 50) / 2.4
 }
 
 TEST(HeightLevels, ThePrintedFitFallsFromTheMeans) {

@@ -1,6 +1,7 @@
 // Surfaces with mesostructure by the host against those by the shaders, pixel by pixel.
 #include <array>
 #include <atomic>
+#include <cmath>
 #include <numeric>
 #include <optional>
 
@@ -9,6 +10,7 @@
 #include "builder/measure/mesh_bvh.h"
 #include "mesostructure/appearance.h"
 #include "mesostructure/base_transfer.h"
+#include "mesostructure/shell_paths.h"
 #include "tests/support/host_comparison.h"
 #include "tests/support/meso_surfaces.h"
 
@@ -82,6 +84,42 @@ TEST_F(HostSurfaces, EveryMethodFromEveryView) {
         // them.
         expectAlike(all, method == "slices" ? 1e-2 : 2e-3);
     }
+}
+
+TEST_F(HostSurfaces, TheCameraMayBeInAPrism) {
+    // Between the beads over a torus, against rays in double through the same shell, and against the shaders.
+    const meso::Asset asset = solidAsset("beads");
+    const auto shape = *meso::shapeOf(asset);
+    const double height = 0.2, tiles = 2;
+    meso::BaseSurface base = *meso::makeBaseSurface("torus", tiles);
+    setSurfaces({mesoSurface(asset, "boxes", "torus", height, tiles)});
+    const meso::ShellPaths paths({{shape.get(), base, height}}, 0.5);
+    uint64_t compared = 0, off = 0;
+    Difference all;
+    // The slab's place in the tile changes with the turn; where a bead is in the way, the camera is in it and sees it.
+    for (const double turn : {0.1, 1.3, 2.2, 4.0})
+        for (const double over : {0.03, 0.1, 0.17}) {
+            const glm::dvec3 out(std::cos(turn), std::sin(turn), 0), along(-out.y, out.x, 0);
+            FrameRequest request =
+                lookFrom({.eye = (1.45 + over) * out, .forward = glm::normalize(along - 0.2 * out), .up = {0, 0, 1}});
+            const test::Planes drawn = test::drawnBy(*host_, request);
+            all += differenceOf(request);
+            for (uint32_t y = 0; y < kHeight; y += 3)
+                for (uint32_t x = 0; x < kWidth; x += 3) {
+                    const CameraRay ray = cameraRay(request.camera, kWidth, kHeight, x + 0.5, y + 0.5);
+                    const meso::TileMeeting truth = paths.meet(ray.origin, ray.direction);
+                    const float depth = drawn.depth[y * kWidth + x];
+                    const bool hits = truth.kind == meso::TileMeeting::Kind::Surface;
+                    ++compared;
+                    if (hits != std::isfinite(depth))
+                        ++off;
+                    else if (hits)  // a grid of 8 cells shows a bead to within a part of a cell
+                        off += std::abs(glm::distance(truth.point.at, ray.origin) - double(depth)) > 0.15;
+                }
+        }
+    EXPECT_GT(compared, 20000u);
+    EXPECT_LT(double(off), 0.1 * double(compared)) << off;
+    expectAlike(all);
 }
 
 TEST_F(HostSurfaces, SolidsWithAndWithoutTheirBase) {

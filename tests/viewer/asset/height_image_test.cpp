@@ -109,7 +109,7 @@ TEST_F(Exr, SizesAreCheckedBeforeTexels) {
         ASSERT_FALSE(map) << width << " x " << height;
         EXPECT_EQ(map.error().code, code) << map.error().line();
     };
-    refused(meso::kMaxGridEdge + 1, 1, ErrorCode::Limit);
+    refused(meso::kMaxMapEdge + 1, 1, ErrorCode::Limit);
     refused(1, std::numeric_limits<int>::max(), ErrorCode::Limit);
     refused(0, 1, ErrorCode::InvalidInput);
     refused(std::numeric_limits<int>::min() + 2, 1, ErrorCode::InvalidInput);
@@ -133,7 +133,7 @@ Bytes seed(const char* name) {
 }
 
 void expectRefused(const Bytes& bytes, ErrorCode code, const char* part) {
-    const auto picture = decodeExr(bytes, meso::kMaxGridEdge);
+    const auto picture = decodeExr(bytes, meso::kMaxMapEdge);
     ASSERT_FALSE(picture) << part;
     EXPECT_EQ(picture.error().code, code) << picture.error().line();
     EXPECT_NE(picture.error().message.find(part), std::string::npos) << picture.error().line();
@@ -251,7 +251,7 @@ TEST(PngHeights, TextIsNotInflatedAndSizesAreChecked) {
         EXPECT_NE(heights.error().message.find(part), std::string::npos) << heights.error().line();
     };
     refused(test::pngFile(4096, 4096, 16, 0, "few"), ErrorCode::InvalidInput, "cannot hold 4096 by 4096");
-    refused(test::pngFile(4097, 1, 1, 0, std::string(514, '\0')), ErrorCode::Limit, "4097 x 1 texels");
+    refused(test::pngFile(16385, 1, 1, 0, std::string(2050, '\0')), ErrorCode::Limit, "16385 x 1 texels");
 }
 
 }  // namespace

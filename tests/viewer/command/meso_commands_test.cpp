@@ -82,6 +82,38 @@ TEST_F(MesoCommands, BuildsAndTellsWhatIsInIt) {
     EXPECT_EQ(Json::parse(run("meso info " + path("a.meso") + " --json").out)["texels"], Json::array({16, 8}));
 }
 
+TEST_F(MesoCommands, LargeMapsAreHeightsAlone) {
+    const std::string build = "meso build needle --texels 4104 -o " + path("large.meso");
+    const Ran refused = run(build);
+    EXPECT_EQ(refused.status, 1);
+    EXPECT_NE(refused.err.find("4104 x 4104 texels: rays are marched over at most 4096"), std::string::npos)
+        << refused.err;
+    EXPECT_NE(refused.err.find("--only-heights"), std::string::npos) << refused.err;
+    EXPECT_FALSE(std::filesystem::exists(path("large.meso")));
+    EXPECT_EQ(run("meso build beads --only-heights -o " + path("none.meso")).status, 2);
+    const Ran built = run(build + " --only-heights --json");
+    ASSERT_EQ(built.status, 0) << built.err;
+    const Json told = Json::parse(built.out);
+    EXPECT_EQ(told["texels"], Json::array({4104, 4104}));
+    EXPECT_TRUE(told["grid"].is_null());
+    EXPECT_LT(told["file_bytes"], 2 * 4104 * 4104 + 1000);
+    const auto draw = [&](const std::string& rest) {
+        std::ofstream(path("scene.json"))
+            << R"({"mesostructure": [{"asset": "large.meso", "tiles": 1, "method": )" << rest << "}]}";
+        return run("render " + path("scene.json") + " --size 64x48 --samples 1 --json -o " + path("large.png") +
+                   " --overwrite");
+    };
+    const Ran drawn = draw(R"("remesh")");
+    ASSERT_EQ(drawn.status, 0) << drawn.err;
+    const Json figures = Json::parse(drawn.out);
+    EXPECT_GT(figures["remeshed_pixels"], 0);
+    EXPECT_LE(figures["remeshed_pixels"], 0.5);
+    EXPECT_GT(figures["surface_bytes"], 2 * 4104 * 4104);
+    const Ran marched = draw(R"("boxes")");
+    EXPECT_EQ(marched.status, 1);
+    EXPECT_NE(marched.err.find("at most 4096"), std::string::npos) << marched.err;
+}
+
 TEST_F(MesoCommands, MeshesMustBeClosed) {
     // A tetrahedron, and the same without a face.
     const std::string corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n", faces = "f 1 3 2\nf 1 2 4\nf 2 3 4\n";
@@ -330,6 +362,30 @@ TEST_F(MesoCommands, BenchHasTheFieldsThatProgramsRelyOn) {
         EXPECT_TRUE(std::filesystem::exists(folder_ / "report" / file)) << file;
     EXPECT_EQ(run("bench meso beads --methods nothing").status, 2);
     EXPECT_EQ(run("bench meso nothing").status, 2);
+}
+
+TEST_F(MesoCommands, BenchMeasuresWhatPrismsDistort) {
+    const Ran ran =
+        run("bench meso ball --methods sphere --views 45 --rays 2000 --repetitions 1 --prisms --progress "
+            "none --json --out " +
+            path("report"));
+    ASSERT_EQ(ran.status, 0) << ran.err;
+    const Json report = Json::parse(ran.out);
+    ASSERT_EQ(report["prisms"].size(), 12u);
+    for (size_t i = 0; i < 12; ++i) {
+        const Json& row = report["prisms"][i];
+        EXPECT_EQ(row["rays"], 2000);
+        EXPECT_LT(row["between"], 500) << row;
+        // What differs between the maps of one prism falls as it turns less, and so does what a torus has of corners.
+        if (i % 4 == 0) continue;
+        const Json& coarser = report["prisms"][i - 1];
+        for (const char* map : {"straight", "tetrahedra", "curved_smooth"}) {
+            const std::string field = std::string(map) + "_p95_texels";
+            EXPECT_LT(row[field].get<double>(), 0.65 * coarser[field].get<double>()) << field << ", row " << i;
+        }
+    }
+    // Without normals there is none to judge.
+    for (const Json& row : report["rows"]) EXPECT_TRUE(row["normal_p50_degrees"].is_null()) << row;
 }
 
 TEST_F(MesoCommands, RendersOnMeshesWithTextureCoordinates) {

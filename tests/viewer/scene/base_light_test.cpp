@@ -1,13 +1,21 @@
 // What bases of a scene do to each other's light, and the folder that keeps it.
 #include "viewer/scene/base_light.h"
 
+#include <algorithm>
+#include <chrono>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <optional>
+#include <thread>
 
 #include <gtest/gtest.h>
 
+#include "mesostructure/transfer_volume.h"
 #include "tests/support/test_folder.h"
+#include "viewer/scene/meso_scene.h"
+#include "viewer/scene/scene_opening.h"
 
 namespace vcp {
 namespace {
@@ -94,6 +102,63 @@ TEST(BaseLight, IsCancelled) {
     const auto stopped = traceBases(boxes(), {}, [](double) { return false; });
     ASSERT_FALSE(stopped);
     EXPECT_EQ(stopped.error().code, ErrorCode::Cancelled);
+}
+
+/// A torus in transferred light, opened as the window does, with a cache of its own.
+class SceneInLight : public ::testing::Test {
+protected:
+    void SetUp() override {
+        if (const char* value = std::getenv("XDG_CACHE_HOME")) before_ = value;
+        setenv("XDG_CACHE_HOME", (folder_ / "cache").c_str(), 1);
+        meso::Asset asset = *openMesoAsset("hemispheres");
+        const auto shape = *meso::shapeOf(asset);
+        asset.transfer = std::make_shared<const meso::TransferVolume>(
+            *meso::traceTransfer(*shape, {.cells = 8, .paths = 16, .shareOut = {}}));
+        ASSERT_TRUE(meso::writeAsset(folder_ / "hemispheres.meso", asset));
+        std::ofstream(scene_) << R"({"mesostructure": [{"asset": "hemispheres.meso", "surface": "torus",)"
+                              << R"( "transfer": true}], "environment": {"source": "studio"}})";
+    }
+    void TearDown() override {
+        if (before_)
+            setenv("XDG_CACHE_HOME", before_->c_str(), 1);
+        else
+            unsetenv("XDG_CACHE_HOME");
+    }
+    Result<OpenedScene> opened(const std::function<bool(const BuildProgress&)>& told) {
+        BuildOptions build;
+        build.progress = told;
+        SceneOpening opening({scene_.string()}, build, {});
+        while (!opening.isDone()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+        return opening.take();
+    }
+
+    const TestFolder folder_{"scene_in_light"};
+    const fs::path scene_ = folder_ / "torus.json";
+    std::optional<std::string> before_;
+};
+
+TEST_F(SceneInLight, TellsHowFarTheLightIsAndCanBeCancelled) {
+    const std::string light = "light of bases";
+    // It is cancelled while the light is traced, and then nothing is kept.
+    const auto stopped = opened([&](const BuildProgress& at) { return at.stage != light || at.fraction < 0.01; });
+    ASSERT_FALSE(stopped);
+    EXPECT_EQ(stopped.error().code, ErrorCode::Cancelled);
+    EXPECT_FALSE(fs::exists(folder_ / "cache" / "vcp") && !filesIn(folder_ / "cache" / "vcp").empty());
+    std::vector<double> parts;
+    const auto keep = [&](const BuildProgress& at) {
+        if (at.stage == light) parts.push_back(at.fraction);
+        return true;
+    };
+    const auto scene = opened(keep);
+    ASSERT_TRUE(scene) << scene.error().line();
+    EXPECT_NE(scene->surfaces.surfaces[0].baseTransfer, nullptr);
+    ASSERT_GT(parts.size(), 2u);
+    EXPECT_TRUE(std::ranges::is_sorted(parts));
+    EXPECT_LE(parts.back(), 1);
+    // What is kept takes no time, and nothing is told.
+    parts.clear();
+    ASSERT_TRUE(opened(keep));
+    EXPECT_TRUE(parts.empty());
 }
 
 }  // namespace
