@@ -326,7 +326,7 @@ TEST_F(Build, ADensePageFitsTheLeastMemory) {
     BuildOptions o = options({ply(mesh)});
     o.cell = 1;
     ASSERT_TRUE(buildOctree(o).ok());
-    EXPECT_EQ(dataset().pages.size(), 3u);
+    EXPECT_EQ(dataset().pages.size(), 4u);
     const std::string bytes = contentOf(o.output);
     o.memoryBytes = 150 << 20;
     const auto report = buildOctree(o);
