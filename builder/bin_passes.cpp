@@ -37,8 +37,7 @@ Result<LevelPlan> planLevels(const BuildOptions& options, const SoupMeasures& me
     VCP_TRY_ASSIGN(plan.errorTarget, chooseError(options, measures, frame));
     plan.setPages(frame, FinestPages({frame.log2Cells, frame.levels - 1}));
     plan.isExact = options.error <= 0;
-    // Beside soft leaves slabs would have to be continued across walls: their surface does not cover the mesh's.
-    plan.hasSlabs = plan.isExact && options.coarseLeaves == CoarseLeaves::Slabs;
+    plan.hasSlabs = hasSlabs(options);
     return plan;
 }
 
@@ -79,7 +78,7 @@ Result<void> buildBinPages(const LevelPlan& plan, LatticeMesh& mesh, const BinPa
 
 FileHeader headerOf(const LevelPlan& plan, const SoupMeasures& measures, bool hasColour, const PartCounts& parts) {
     FileHeader header = headerOf(measures, plan.frame, plan.errorTarget, hasColour);
-    if (plan.hasSlabs) header.flags |= kFlagCovering;
+    if (plan.hasSlabs) header.flags |= kFlagCovering | kFlagFineSlabs;
     header.flags |= kFlagParts;
     header.parts = parts.parts;
     header.closedParts = parts.closed;

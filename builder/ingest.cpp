@@ -368,6 +368,9 @@ Result<GridFrame> chooseFrame(const BuildOptions& options, const SoupMeasures& m
         return badInput(options, fmt::format("it ends more than 2^20 cells of {:g} behind the origin that is asked for",
                                              frame.cell));
     while (std::ldexp(1.0, int(frame.log2Cells + frame.levels - 1)) < cellsAcross) ++frame.levels;
+    // The one page that holds all has slabs of half its cells. The one above it has slabs of its cells, a fourth as
+    // many: that is what a first picture waits for.
+    if (hasSlabs(options) && frame.levels > 1) ++frame.levels;
     return frame;
 }
 

@@ -140,6 +140,12 @@ MeshOpenOptions meshOptionsOf(const BuildOptions& options);
 /// are not, or where the cell was given.
 std::optional<std::string> wideCellWarning(const BuildOptions& options, const SoupMeasures& measures);
 
+/// Whether coarser levels are slabs. Beside soft leaves these would have to be continued across walls: their surface
+/// does not cover the mesh's.
+inline bool hasSlabs(const BuildOptions& options) {
+    return options.error <= 0 && options.coarseLeaves == CoarseLeaves::Slabs;
+}
+
 /// Chooses the grid; `options.cell` 0 chooses a cell from the area, the lengths and the number of triangles, then twice
 /// as long as often as `levelsLess` says. Errors: InvalidInput, Limit.
 Result<GridFrame> chooseFrame(const BuildOptions& options, const SoupMeasures& measures, uint32_t levelsLess = 0);

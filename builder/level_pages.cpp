@@ -8,7 +8,7 @@
 #include <oneapi/tbb/parallel_for.h>
 
 #include "builder/page/exact_tree.h"
-#include "builder/slab/page_surface.h"
+#include "builder/slab/slab_tree.h"
 
 namespace vcp {
 
@@ -45,8 +45,8 @@ Result<BuiltPage> buildPage(const LevelSettings& settings, const LatticeMesh& me
                             std::span<const uint32_t> triangles, bool withSurface, size_t mostPieces) {
     VCP_TRY_ASSIGN(auto page, storedPage(settings, mesh, code, triangles));
     if (withSurface)
-        page.surface = storedSurface(
-            surfaceOf(mesh, triangles, mortonDecode(code), settings.grid.log2Cells, mostPieces), settings.codesSurface);
+        page.surface = surfaceToHandUp(
+            settings, surfaceOf(mesh, triangles, mortonDecode(code), settings.grid.log2Cells, mostPieces));
     return page;
 }
 
@@ -164,6 +164,12 @@ Result<BuiltPage> builtPage(const LevelSettings& settings, uint64_t code, const 
         VCP_TRY_ASSIGN(page.stored, compressPage(encoded.draft, encoded.colour));
     }
     return page;
+}
+
+StoredPage surfaceToHandUp(const LevelSettings& settings, PageSurface surface) {
+    std::vector<CellSlab> slabs = slabsOf(surface, settings.withColour);
+    surface.quarters = {};
+    return storedSurface({std::move(surface.halves), std::move(slabs)}, settings.codesSurface);
 }
 
 Result<void> buildPages(const LevelSettings& settings, const LatticeMesh& mesh, const TriangleBins& bins,

@@ -9,6 +9,7 @@
 #include "builder/ordered_pages.h"
 #include "builder/page/bin_triangles.h"
 #include "builder/page/page_encoder.h"
+#include "builder/slab/page_surface.h"
 
 namespace vcp {
 
@@ -32,6 +33,9 @@ struct LevelSettings {
 /// Returns a page of the level at a Morton code, coded, with its entry; without its surface. Errors: InvalidInput (it
 /// holds more than a page can name).
 Result<BuiltPage> builtPage(const LevelSettings& settings, uint64_t code, const EncodedPage& encoded);
+
+/// Returns what a page hands up to the page above it, as temporary files keep it.
+StoredPage surfaceToHandUp(const LevelSettings& settings, PageSurface surface);
 
 /// Builds the pages of `bins`, numbers in the bin's mesh, and appends those with surface to `spool`; where `surfaces`
 /// is not null, it takes the surface in each page, from which the level above is made (slab_pages.h). `progress` is

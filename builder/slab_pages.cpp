@@ -10,41 +10,57 @@ namespace vcp {
 
 namespace {
 
-uint64_t halvesBelow(const PageSpool& below, Siblings siblings) {
-    uint64_t halves = 0;
-    for (size_t i = siblings.first; i < siblings.end; ++i) halves += storedCells(below.entries()[i].pageBytes);
-    return halves;
+/// What the pages below hand up, before it is read.
+struct CountBelow {
+    uint64_t halves = 0, slabs = 0;
+
+    CountBelow(const PageSpool& below, Siblings siblings) {
+        for (size_t i = siblings.first; i < siblings.end; ++i) {
+            halves += storedCells(below.entries()[i].pageBytes);
+            slabs += storedSlabs(below.entries()[i].colourBytes);
+        }
+    }
+};
+
+Result<SurfaceBelow> readSurface(const PageSpool& below, const PageEntry& entry) {
+    VCP_TRY_ASSIGN(const auto stored, below.read(entry));
+    auto surface = surfaceFrom(stored);
+    if (!surface) return below.damaged(entry);
+    return std::move(*surface);
 }
 
-Result<PageSurface> surfaceAbove(const PageSpool& below, Siblings siblings, uint32_t log2Cells) {
-    PageFold fold(log2Cells, halvesBelow(below, siblings));
+Result<PageFold> foldBelow(const PageSpool& below, Siblings siblings, uint32_t log2Cells) {
+    const CountBelow count(below, siblings);
+    PageFold fold(log2Cells, count.halves, count.slabs);
     for (size_t i = siblings.first; i < siblings.end; ++i) {
         const PageEntry& entry = below.entries()[i];
-        VCP_TRY_ASSIGN(const auto stored, below.read(entry));
-        const auto halves = surfaceFrom(stored);
-        if (!halves) return below.damaged(entry);
-        fold.add(*halves, uint32_t(entry.morton & 7));
+        VCP_TRY_ASSIGN(const auto surface, readSurface(below, entry));
+        fold.add(surface, uint32_t(entry.morton & 7));
     }
-    return fold.take();
+    return fold;
 }
 
 Result<BuiltPage> buildPage(const LevelSettings& settings, const PageSpool& below, Siblings siblings,
                             bool withSurface) {
-    VCP_TRY_ASSIGN(auto surface, surfaceAbove(below, siblings, settings.grid.log2Cells));
-    PageTree tree = buildSlabTree(surface, settings.grid.log2Cells, settings.withColour);
-    surface.quarters = {};
+    VCP_TRY_ASSIGN(auto fold, foldBelow(below, siblings, settings.grid.log2Cells));
+    StoredPage surface;
+    if (withSurface) surface = surfaceToHandUp(settings, foldSurface(fold.quarters, settings.withColour));
+    fold.quarters = {};
+    PageTree tree = slabTree(fold.slabs, settings.grid.log2Cells);
     const uint64_t code = below.entries()[siblings.first].morton >> 3;
     VCP_TRY_ASSIGN(auto page, builtPage(settings, code, encodeSlabPage(tree, settings.withColour)));
     page.entry.colourErrorP95 = colourErrorCode(tree.colourError.p95);
     page.entry.colourErrorMax = colourErrorCode(tree.colourError.max);
-    if (withSurface) page.surface = storedSurface(surface.halves, settings.codesSurface);
+    page.surface = std::move(surface);
     return page;
 }
 
 /// Returns the memory to build a page above these: their cells, put together as they are read, and its octree; then its
 /// bytes. Measured: at most 2 times the halves of cells below, of pages with few of them 3 times.
 uint64_t workOf(const PageSpool& below, Siblings siblings) {
-    return (4 << 20) + halvesBelow(below, siblings) * (sizeof(CellSurface) + sizeof(uint32_t)) * 5 / 2;
+    const CountBelow count(below, siblings);
+    return (4 << 20) + count.halves * (sizeof(CellSurface) + sizeof(uint32_t)) * 5 / 2 +
+           count.slabs * sizeof(CellSlab) * 7;
 }
 
 }  // namespace
@@ -62,10 +78,8 @@ std::vector<Siblings> siblingsIn(const PageSpool& spool) {
 Result<void> keepSurfaces(const PageSpool& below, Siblings siblings, PageSpool& kept) {
     for (size_t i = siblings.first; i < siblings.end; ++i) {
         const PageEntry& entry = below.entries()[i];
-        VCP_TRY_ASSIGN(const auto stored, below.read(entry));
-        const auto halves = surfaceFrom(stored);
-        if (!halves) return below.damaged(entry);
-        VCP_TRY(kept.append({.morton = entry.morton}, storedSurface(*halves, true)));
+        VCP_TRY_ASSIGN(const auto surface, readSurface(below, entry));
+        VCP_TRY(kept.append({.morton = entry.morton}, storedSurface(surface, true)));
     }
     return {};
 }

@@ -18,6 +18,10 @@ namespace vcp {
 
 double Dataset::cellOf(uint32_t level) const { return std::ldexp(header.cell, int(header.levels - 1 - level)); }
 
+double Dataset::slabEdgeOf(uint32_t level) const {
+    return (header.flags & kFlagFineSlabs) != 0 ? cellOf(level) / 2 : cellOf(level);
+}
+
 double Dataset::edgeOf(const PageEntry& page) const { return std::ldexp(cellOf(page.level), int(header.log2Cells)); }
 
 glm::dvec3 Dataset::originOf(const PageEntry& page) const {

@@ -26,6 +26,8 @@ struct Dataset {
     [[nodiscard]] bool hasOpenParts() const { return header.closedParts < header.parts; }
     /// Edge of a cell of `level`, world units.
     [[nodiscard]] double cellOf(uint32_t level) const;
+    /// Returns the edge of a level's widest slab leaves, world units.
+    [[nodiscard]] double slabEdgeOf(uint32_t level) const;
     /// World position of the lowest corner of a page.
     [[nodiscard]] glm::dvec3 originOf(const PageEntry& page) const;
     /// Edge of a page, world units.

@@ -79,7 +79,8 @@ private:
                          (h_.version >= kMarkedFileVersion ? kFlagMarks : 0) |
                          (h_.version >= kImagesFileVersion ? kFlagImages : 0) |
                          (h_.version >= kChannelsFileVersion ? kFlagChannels : 0) |
-                         (h_.version >= kColourErrorsFileVersion ? kFlagColourErrors : 0));
+                         (h_.version >= kColourErrorsFileVersion ? kFlagColourErrors : 0) |
+                         (h_.version >= kFineSlabsFileVersion ? kFlagFineSlabs : 0));
         if (unknown != 0)
             return fail(offsetof(FileHeader, flags),
                         fmt::format("flags {:#x} are not known to this program: use a newer program", unknown),
@@ -87,11 +88,12 @@ private:
         // Each version above the usual one is of files that have what it is for.
         const auto has = [this](uint32_t flags) { return (h_.flags & flags) == flags; };
         constexpr uint32_t kWithImages = kFlagColour | kFlagParts | kFlagImages;
-        const bool isAskedFor = h_.version == kColourErrorsFileVersion ? has(kFlagColour | kFlagColourErrors)
-                                : h_.version == kChannelsFileVersion   ? has(kWithImages | kFlagChannels)
-                                : h_.version == kImagesFileVersion     ? has(kWithImages)
-                                : h_.version == kMarkedFileVersion     ? has(kFlagParts | kFlagMarks)
-                                                                       : true;
+        const bool isAskedFor = h_.version == kFineSlabsFileVersion      ? has(kFlagCovering | kFlagFineSlabs)
+                                : h_.version == kColourErrorsFileVersion ? has(kFlagColour | kFlagColourErrors)
+                                : h_.version == kChannelsFileVersion     ? has(kWithImages | kFlagChannels)
+                                : h_.version == kImagesFileVersion       ? has(kWithImages)
+                                : h_.version == kMarkedFileVersion       ? has(kFlagParts | kFlagMarks)
+                                                                         : true;
         if (!isAskedFor) return fail(offsetof(FileHeader, flags), "nothing in the flags asks for this version");
         return {};
     }

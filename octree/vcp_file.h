@@ -1,7 +1,7 @@
 // The .vcp file, version 6; 7 where pages have open marks, 8 where there are images, 9 where materials have further
-// channels, and 10 where pages say how far off the colours of their slabs are. Files of versions 3 to 5 are read, too:
-// they say nothing of parts; those of versions 3 and 4 have all pages without children on the finest level; those of
-// version 3 have no slab leaves and no kFlagCovering.
+// channels, 10 where pages say how far off the colours of their slabs are, and 11 where slabs are half a cell wide.
+// Files of versions 3 to 5 are read, too: they say nothing of parts; those of versions 3 and 4 have all pages without
+// children on the finest level; those of version 3 have no slab leaves and no kFlagCovering.
 //
 // Pages without children hold the finest surface. Most are of the finest level; where triangles are few, they are of
 // coarser ones.
@@ -38,7 +38,8 @@ inline constexpr uint32_t kMarkedFileVersion = 7;                           ///<
 inline constexpr uint32_t kImagesFileVersion = 8;                           ///< with kFlagImages
 inline constexpr uint32_t kChannelsFileVersion = 9;                         ///< with kFlagChannels
 inline constexpr uint32_t kColourErrorsFileVersion = 10;                    ///< with kFlagColourErrors
-inline constexpr uint32_t kOldestFileVersion = 3, kNewestFileVersion = 10;  ///< that are read
+inline constexpr uint32_t kFineSlabsFileVersion = 11;                       ///< with kFlagFineSlabs
+inline constexpr uint32_t kOldestFileVersion = 3, kNewestFileVersion = 11;  ///< that are read
 inline constexpr uint32_t kMaxLevels = 22;                                  ///< Morton codes have 21 bits an axis
 inline constexpr uint32_t kMaxPaperLog2Cells = 20;
 inline constexpr uint64_t kDirectoryOffset = 4096;
@@ -112,6 +113,10 @@ inline constexpr uint32_t kFlagChannels = 32;
 
 /// With kFlagColour: entries of pages with slab leaves say how far off their colours are.
 inline constexpr uint32_t kFlagColourErrors = 64;
+
+/// With kFlagCovering: slab leaves are as wide as the cells of the level below, at most; without it, as those of their
+/// own level.
+inline constexpr uint32_t kFlagFineSlabs = 128;
 
 /// What PageEntry::parts is made of. kPageHasMarks: with both others only; marks tell which surface is whose.
 inline constexpr uint8_t kPageHasClosed = 1, kPageHasOpen = 2, kPageHasMarks = 4;

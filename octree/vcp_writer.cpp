@@ -128,6 +128,7 @@ Result<uint64_t> VcpWriter::commit(FileHeader header) {
         header.version = kColourErrorsFileVersion;
         header.flags |= kFlagColourErrors;
     }
+    if ((header.flags & kFlagFineSlabs) != 0) header.version = kFineSlabsFileVersion;
     header.pages = pages_;
     header.fileBytes = end_ + sizeof(CommitRecord);
     header.hash = 0;

@@ -37,7 +37,7 @@ bool isColourOff(const PageEntry& page, const SelectionView& view) {
 
 double refinedError(const Dataset& dataset, const PageEntry& page, const SelectionView& view) {
     const double certified = double(page.certifiedError);
-    return isColourOff(page, view) ? std::max(certified, dataset.cellOf(page.level)) : certified;
+    return isColourOff(page, view) ? std::max(certified, dataset.slabEdgeOf(page.level)) : certified;
 }
 
 namespace {
@@ -384,7 +384,8 @@ private:
         const double cell = dataset_.cellOf(entry.level);
         drawable_.errorPixels = std::max(drawable_.errorPixels, shown(double(entry.certifiedError), cell, cube, view_));
         if (isColourOff(entry, view_))
-            drawable_.colourPixels = std::max(drawable_.colourPixels, shown(cell, cell, cube, view_));
+            drawable_.colourPixels =
+                std::max(drawable_.colourPixels, shown(dataset_.slabEdgeOf(entry.level), cell, cube, view_));
     }
 
     const Dataset& dataset_;

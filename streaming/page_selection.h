@@ -13,8 +13,9 @@
 // Where pages cover the surface of those below them (kFlagCovering), a page is refined octant by octant: a child
 // replaces its parent there, and elsewhere the parent is drawn. So its error counts at the point of the octant nearest
 // to the eye, and only children that the view's rays ask for are wanted (streaming/pages_seen.h), and the others only
-// where their parent's error is above kUnseenErrors times what is allowed: what lies behind other surfaces is not read, but what comes into view is nearly fine enough. What is drawn
-// is as fine as what is there allows. Elsewhere a page is replaced by all its children or none.
+// where their parent's error is above kUnseenErrors times what is allowed: what lies behind other surfaces is not read,
+// but what comes into view is nearly fine enough. What is drawn is as fine as what is there allows. Elsewhere a page is
+// replaced by all its children or none.
 //
 // Several views, and several datasets of one scene, share one choice and one budget: a page is refined where any of
 // them needs it, the largest error as a multiple of what its view allows first. Each view draws the choice only as fine

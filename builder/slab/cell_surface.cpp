@@ -75,6 +75,8 @@ void chooseAxis(CellSurface& cell) {
         const double yz2 = xy * zx + yy * yz + yz * zz, zx2 = zx * xx + yz * xy + zz * zx,
                      xy2 = xx * xy + xy * yy + zx * yz;
         xx = xx2, yy = yy2, zz = zz2, yz = yz2, zx = zx2, xy = xy2;
+        // Of trace 1, the squares of its main values are 1 together where there is one direction only.
+        if (xx + yy + zz > 1 - 1e-13) break;
     }
     const glm::dvec3 column = xx >= yy && xx >= zz ? glm::dvec3(xx, xy, zx)
                               : yy >= zz           ? glm::dvec3(xy, yy, yz)

@@ -9,6 +9,8 @@
 #include <cstdint>
 #include <span>
 
+#include <glm/common.hpp>
+#include <glm/gtc/type_precision.hpp>
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
 
@@ -23,6 +25,17 @@ struct CellSurface {
     std::array<float, 6> moment{};  ///< sums of area n n^T over the surface's normals n: xx, yy, zz, yz, zx, xy
     glm::vec4 light{0};             ///< sum of area * (linear RGB, alpha)
     uint32_t parts = 0;             ///< kinds of parts that it belongs to, as PageEntry's
+};
+
+/// A box that holds the surface in an eighth of a cell, in 1/255 of the eighth's edge from its lowest corner.
+struct EighthBox {
+    glm::u8vec3 lower{255}, upper{0};
+
+    EighthBox() = default;
+    /// Rounds a box outwards; coordinates as in CellSurface.
+    EighthBox(glm::vec3 least, glm::vec3 most)
+        : lower(glm::clamp(glm::floor((least + 0.5f) * 255.0f), 0.0f, 255.0f)),
+          upper(glm::clamp(glm::ceil((most + 0.5f) * 255.0f), 0.0f, 255.0f)) {}
 };
 
 /// The values between which something lies.
@@ -49,6 +62,9 @@ void chooseAxis(CellSurface& cell);
 
 /// Returns how far the normals are from the axis: the mean of their squared sines, 0 to 2/3.
 double normalSpread(const CellSurface& cell);
+
+/// Returns the sum of area * linear RGB, and the area.
+inline glm::vec4 litArea(const CellSurface& cell) { return {cell.light.x, cell.light.y, cell.light.z, cell.area}; }
 
 /// Returns the mean light as a stored colour; white where the surface has no area.
 uint32_t meanColour(const CellSurface& cell);

@@ -1,15 +1,11 @@
 #include "builder/slab/page_surface.h"
 
 #include <algorithm>
-#include <array>
 #include <bit>
-#include <cstring>
 
 #include <glm/common.hpp>
 
 #include "builder/slab/triangle_cutter.h"
-#include "builder/spill/record_coder.h"
-#include "octree/surface/leaf_math.h"
 
 namespace vcp {
 
@@ -53,21 +49,21 @@ public:
     SurfaceCutter(const LatticeMesh& mesh, glm::i32vec3 origin, int depth, size_t mostPieces)
         : mesh_(mesh), origin_(origin), depth_(depth), mostPieces_(mostPieces) {}
 
-    /// Appends the cells of a box, in Morton order.
-    void run(std::span<const uint32_t> triangles, CutterBox box, SurfaceCells& cells) const {
-        if (cutAll(triangles, box, cells)) return;
-        for (int octant = 0; octant < 8; ++octant) run(triangles, box.child(octant), cells);
+    /// Appends the half cells of a box and their eighths, in Morton order.
+    void run(std::span<const uint32_t> triangles, CutterBox box, PageSurface& surface) const {
+        if (cutAll(triangles, box, surface)) return;
+        for (int octant = 0; octant < 8; ++octant) run(triangles, box.child(octant), surface);
     }
 
 private:
     /// Returns false, and appends nothing, where there are too many pieces.
-    bool cutAll(std::span<const uint32_t> triangles, CutterBox box, SurfaceCells& cells) const {
+    bool cutAll(std::span<const uint32_t> triangles, CutterBox box, PageSurface& surface) const {
         TriangleCutter cutter(mesh_, origin_, depth_, box);
         for (const uint32_t k : triangles) {
             cutter.cut(k);
             if (cutter.pieces() > mostPieces_ && box.log2Edge > 0) return false;
         }
-        cutter.appendTo(cells);
+        cutter.appendTo(surface.halves, surface.quarters);
         return true;
     }
 
@@ -79,13 +75,14 @@ private:
 
 }  // namespace
 
-SurfaceCells surfaceOf(const LatticeMesh& mesh, std::span<const uint32_t> triangles, glm::u32vec3 page,
-                       uint32_t log2Cells, size_t mostPieces) {
+PageSurface surfaceOf(const LatticeMesh& mesh, std::span<const uint32_t> triangles, glm::u32vec3 page,
+                      uint32_t log2Cells, size_t mostPieces) {
     const glm::i32vec3 origin = glm::i32vec3(page) * (kLatticePerCell << log2Cells);
     const int depth = int(log2Cells) + 1;
-    SurfaceCells halves;
-    SurfaceCutter(mesh, origin, depth, mostPieces).run(triangles, {glm::ivec3(0), depth}, halves);
-    return halves;
+    PageSurface surface;
+    SurfaceCutter(mesh, origin, depth, mostPieces).run(triangles, {glm::ivec3(0), depth}, surface);
+    surface.cells = foldCells(surface.halves);
+    return surface;
 }
 
 uint64_t halvesTouched(const LatticeMesh& mesh, std::span<const uint32_t> triangles, glm::u32vec3 page,
@@ -110,104 +107,18 @@ uint64_t halvesTouched(const LatticeMesh& mesh, std::span<const uint32_t> triang
     return halves;
 }
 
-PageFold::PageFold(uint32_t log2Cells, size_t halves) : log2Cells_(log2Cells) { reserve(above_.quarters, halves); }
-
-void PageFold::add(const SurfaceCells& halves, uint32_t octant) {
-    SurfaceCells& quarters = above_.quarters;
-    for (const uint32_t code : halves.codes) quarters.codes.push_back(octant << 3 * (log2Cells_ + 1) | code);
-    quarters.cells.insert(quarters.cells.end(), halves.cells.begin(), halves.cells.end());
-}
-
-PageSurface PageFold::take() {
-    above_.halves = foldCells(above_.quarters);
-    above_.cells = foldCells(above_.halves);
-    return std::move(above_);
-}
-
-namespace {
-
-/// So many cells are coded at a time.
-constexpr size_t kBlockCells = 4096;
-
-/// A cell on temporary files: all of CellSurface but the axis.
-struct StoredCell {
-    uint32_t code = 0;
-    glm::vec3 lower{0}, upper{0};
-    float first = 0, last = 0, area = 0;
-    std::array<float, 6> moment{};
-    glm::vec4 light{0};
-    uint32_t parts = 0;
-};
-static_assert(sizeof(StoredCell) == 84 && sizeof(CellSurface) == sizeof(StoredCell) - sizeof(uint32_t) + 12);
-
-}  // namespace
-
-size_t storedCells(uint64_t geometryBytes) { return geometryBytes / sizeof(StoredCell); }
-
-StoredPage storedSurface(const SurfaceCells& cells, bool isCoded) {
-    StoredPage stored;
-    stored.geometryBytes = uint32_t(cells.size() * sizeof(StoredCell));
-    std::vector<StoredCell> block;
-    for (size_t first = 0; first < cells.size(); first += block.size()) {
-        block.resize(std::min(kBlockCells, cells.size() - first));
-        for (size_t i = 0; i < block.size(); ++i) {
-            const CellSurface& c = cells.cells[first + i];
-            block[i] = {cells.codes[first + i], c.lower, c.upper, c.first, c.last, c.area, c.moment, c.light, c.parts};
-        }
-        const auto bytes = std::as_bytes(std::span(block));
-        const size_t at = stored.geometry.size(), begin = at + sizeof(uint32_t);
-        stored.geometry.resize(begin);
-        if (!isCoded || !codeRecords(bytes, sizeof(StoredCell), stored.geometry))
-            stored.geometry.insert(stored.geometry.end(), bytes.begin(), bytes.end());
-        const auto blockBytes = uint32_t(stored.geometry.size() - begin);
-        std::memcpy(stored.geometry.data() + at, &blockBytes, sizeof blockBytes);
+PageSurface foldSurface(const SurfaceCells& quarters, bool withColour) {
+    PageSurface surface;
+    surface.halves = foldCells(quarters);
+    surface.cells = foldCells(surface.halves);
+    surface.quarters.codes = quarters.codes;
+    surface.quarters.boxes.reserve(quarters.size());
+    if (withColour) surface.quarters.lights.reserve(quarters.size());
+    for (const CellSurface& c : quarters.cells) {
+        surface.quarters.boxes.emplace_back(c.lower, c.upper);
+        if (withColour) surface.quarters.lights.push_back(litArea(c));
     }
-    return stored;
-}
-
-namespace {
-
-/// Takes the first block off `stored`, to `cells`. Returns false where it is not what was stored.
-bool takeBlock(std::span<const std::byte>& stored, std::span<StoredCell> cells) {
-    uint32_t blockBytes = 0;
-    if (stored.size() < sizeof blockBytes) return false;
-    std::memcpy(&blockBytes, stored.data(), sizeof blockBytes);
-    stored = stored.subspan(sizeof blockBytes);
-    if (stored.size() < blockBytes) return false;
-    const std::span<const std::byte> block = stored.first(blockBytes);
-    stored = stored.subspan(blockBytes);
-    const auto bytes = std::as_writable_bytes(cells);
-    if (block.size() != bytes.size()) return decodeRecords(block, sizeof(StoredCell), bytes);
-    std::ranges::copy(block, bytes.begin());
-    return true;
-}
-
-}  // namespace
-
-std::optional<SurfaceCells> surfaceFrom(const StoredPage& stored) {
-    std::span<const std::byte> left = stored.geometry;
-    const size_t count = storedCells(stored.geometryBytes);
-    SurfaceCells cells;
-    reserve(cells, count);
-    std::vector<StoredCell> block;
-    while (cells.size() < count) {
-        block.resize(std::min(kBlockCells, count - cells.size()));
-        if (!takeBlock(left, block)) return std::nullopt;
-        for (const StoredCell& s : block) {
-            cells.codes.push_back(s.code);
-            cells.cells.push_back({.lower = s.lower,
-                                   .upper = s.upper,
-                                   .first = s.first,
-                                   .last = s.last,
-                                   .area = s.area,
-                                   .moment = s.moment,
-                                   .light = s.light,
-                                   .parts = s.parts});
-            chooseAxis(cells.cells.back());
-        }
-    }
-    if (!left.empty()) return std::nullopt;
-    return cells;
+    return surface;
 }
 
 }  // namespace vcp

@@ -17,7 +17,7 @@ inline constexpr double kAnySlabError = 0.8664;
 /// A quarter of a leaf that has surface; `code`: its Morton code among the 64.
 struct SurfaceQuarter {
     uint32_t code;
-    const CellSurface* surface;
+    EighthBox box;
 };
 
 /// Bounds the error of a slab leaf, both ways, in its edges. `direction`: as it is decoded; `slab`: the slab as it is

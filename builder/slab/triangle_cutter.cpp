@@ -9,6 +9,7 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/gtc/type_precision.hpp>
+#include <glm/vector_relational.hpp>
 
 #include "builder/stream/colour_encoding.h"
 #include "octree/surface/leaf_math.h"
@@ -56,11 +57,20 @@ glm::dvec4 lightOfColour(const glm::dvec4& stored) {
     return {lightOfStored(stored.r), lightOfStored(stored.g), lightOfStored(stored.b), stored.a};
 }
 
+/// Returns the mean light of a triangle over which stored colours are blended, by the six points of Dunavant's rule of
+/// degree 4 (High degree efficient symmetrical Gaussian quadrature rules for the triangle, 1985, table II).
+glm::dvec4 meanLight(const glm::dvec4& a, const glm::dvec4& b, const glm::dvec4& c) {
+    const auto three = [&](double apart) {
+        const glm::dvec4 rest = apart * (a + b + c);
+        const double own = 1 - 3 * apart;
+        return lightOfColour(rest + own * a) + lightOfColour(rest + own * b) + lightOfColour(rest + own * c);
+    };
+    return 0.109951743655322 * three(0.091576213509771) + 0.223381589678011 * three(0.445948490915965);
+}
+
 }  // namespace
 
-// Pictures blend stored colours over a triangle and take their light. A fan is summed up by the middles of its
-// triangles' edges, which is exact for quadratics: of light that goes from black to white within a piece, it errs by a
-// few hundredths.
+// Pictures blend stored colours over a triangle and take their light, whose mean a fan of triangles sums up.
 glm::vec4 TriangleCutter::lightOf(const Polygon& piece) const {
     if (mesh_.colours.empty()) return glm::vec4(1);
     if (source_.isPlain) return glm::vec4(lightOfColour(source_.colour[0]));
@@ -74,12 +84,11 @@ glm::vec4 TriangleCutter::lightOf(const Polygon& piece) const {
     for (size_t i = 2; i < piece.size(); ++i) {
         const glm::dvec4 after = storedAt(piece[i]);
         const double share = glm::length(glm::cross(piece[i - 1] - piece[0], piece[i] - piece[0]));
-        sum += share * (lightOfColour((first + before) / 2.0) + lightOfColour((before + after) / 2.0) +
-                        lightOfColour((after + first) / 2.0));
+        sum += share * meanLight(first, before, after);
         area += share;
         before = after;
     }
-    return glm::vec4(sum / (3 * area));
+    return glm::vec4(sum / area);
 }
 
 TriangleCutter::Source TriangleCutter::sourceOf(uint32_t triangle) const {
@@ -265,7 +274,89 @@ CellSurface TriangleCutter::sum(std::span<const uint64_t> pieces) const {
     return cell;
 }
 
-void TriangleCutter::appendTo(SurfaceCells& cells) const {
+namespace {
+
+/// Adds parts of a polygon to the eighths of its cell in which they are. Coordinates count from the cell's centre, in
+/// its edges.
+class EighthSums {
+public:
+    explicit EighthSums(bool withColour) : withColour_(withColour) {}
+
+    void add(std::span<const glm::vec3> corners, glm::vec4 light) {
+        glm::vec3 lower = corners[0], upper = corners[0];
+        Polygon piece;
+        for (const glm::vec3& x : corners) {
+            lower = glm::min(lower, x);
+            upper = glm::max(upper, x);
+            piece.add(glm::dvec3(x));
+        }
+        const glm::bvec3 isAbove = glm::greaterThan(lower, glm::vec3(0));
+        // Most pieces are in one octant.
+        if (glm::all(glm::notEqual(isAbove, glm::lessThan(upper, glm::vec3(0)))))
+            return addTo(int(isAbove.x) + 2 * int(isAbove.y) + 4 * int(isAbove.z), piece, light);
+        const PolygonSides x = partAt(piece, 0, 0, room_[0], room_[1]);
+        for (int i = 0; i < 2; ++i) {
+            const Polygon* byX = i == 0 ? x.below : x.above;
+            if (byX == nullptr) continue;
+            const PolygonSides y = partAt(*byX, 1, 0, room_[2], room_[3]);
+            for (int j = 0; j < 2; ++j) {
+                const Polygon* byY = j == 0 ? y.below : y.above;
+                if (byY == nullptr) continue;
+                const PolygonSides z = partAt(*byY, 2, 0, room_[4], room_[5]);
+                if (z.below != nullptr) addTo(i + 2 * j, *z.below, light);
+                if (z.above != nullptr) addTo(i + 2 * j + 4, *z.above, light);
+            }
+        }
+    }
+
+    /// Appends the eighths of cell `code` that have surface.
+    void appendTo(uint32_t code, SurfaceQuarters& quarters) {
+        for (uint32_t o = 0; o < 8; ++o) {
+            if (lower_[o].x > upper_[o].x) continue;
+            quarters.codes.push_back(code << 3 | o);
+            quarters.boxes.emplace_back(lower_[o] - 2 * kRounding, upper_[o] + 2 * kRounding);
+            if (withColour_) quarters.lights.push_back(light_[o]);
+        }
+    }
+
+private:
+    static std::array<glm::vec3, 8> filled(float value) {
+        std::array<glm::vec3, 8> all;
+        all.fill(glm::vec3(value));
+        return all;
+    }
+
+    void addTo(int octant, const Polygon& part, glm::vec4 light) {
+        const auto o = size_t(octant);
+        const glm::dvec3 centre = octantCentre(uint32_t(octant));
+        for (const glm::dvec3& p : part) {
+            const glm::vec3 x(2.0 * (p - centre));
+            lower_[o] = glm::min(lower_[o], x);
+            upper_[o] = glm::max(upper_[o], x);
+        }
+        if (!withColour_) return;
+        const auto area = float(2 * glm::length(areaVector(part)));
+        light_[o] += area * glm::vec4(glm::vec3(light), 1);
+    }
+
+    bool withColour_;
+    std::array<glm::vec3, 8> lower_ = filled(1), upper_ = filled(-1);
+    std::array<glm::vec4, 8> light_{};  // sums of area * linear RGB, and area
+    std::array<Polygon, 6> room_;
+};
+
+}  // namespace
+
+void TriangleCutter::appendEighths(uint32_t code, std::span<const uint64_t> pieces, SurfaceQuarters& quarters) const {
+    EighthSums sums(!mesh_.colours.empty());
+    for (const uint64_t number : pieces) {
+        const CellPiece& piece = pieces_[uint32_t(number)];
+        sums.add(std::span(corners_).subspan(piece.first, piece.count), piece.light);
+    }
+    sums.appendTo(code, quarters);
+}
+
+void TriangleCutter::appendTo(SurfaceCells& cells, SurfaceQuarters& quarters) const {
     // Cells in order, and in each the pieces as they were cut.
     std::vector<uint64_t> order(pieces_.size());
     for (size_t i = 0; i < order.size(); ++i) order[i] = uint64_t{pieces_[i].code} << 32 | i;
@@ -275,7 +366,9 @@ void TriangleCutter::appendTo(SurfaceCells& cells) const {
         size_t end = i;
         while (end < order.size() && uint32_t(order[end] >> 32) == code) ++end;
         cells.codes.push_back(code);
-        cells.cells.push_back(sum(std::span(order).subspan(i, end - i)));
+        const auto pieces = std::span(order).subspan(i, end - i);
+        cells.cells.push_back(sum(pieces));
+        appendEighths(code, pieces, quarters);
         i = end;
     }
 }

@@ -33,8 +33,9 @@ public:
     /// Cuts a triangle of the mesh; what lies outside of the box is left out. A piece in a wall belongs to both sides.
     void cut(uint32_t triangle);
     [[nodiscard]] size_t pieces() const { return pieces_.size(); }
-    /// Appends what is known of the box's cells, in Morton order. To be called once, after all cuts.
-    void appendTo(SurfaceCells& cells) const;
+    /// Appends what is known of the box's cells and of their eighths, in Morton order. To be called once, after all
+    /// cuts.
+    void appendTo(SurfaceCells& cells, SurfaceQuarters& quarters) const;
 
 private:
     /// The triangle that is being cut, in the cutter's cells from the page's lowest corner, and what is blended over
@@ -87,6 +88,7 @@ private:
     [[nodiscard]] glm::vec4 lightOf(const Polygon& piece) const;
     /// `pieces`: their numbers in the low halves of words.
     [[nodiscard]] CellSurface sum(std::span<const uint64_t> pieces) const;
+    void appendEighths(uint32_t code, std::span<const uint64_t> pieces, SurfaceQuarters& quarters) const;
 
     static constexpr int kMostWalls = 6;
     static constexpr size_t kMostParts = 27;  // with two walls along each axis

@@ -108,7 +108,8 @@ TEST_F(Build, SaysWhichPartsAreClosed) {
     EXPECT_EQ(built.header.closedParts, 2u);
     EXPECT_GT(built.header.openEdges, 10u);
     EXPECT_EQ(built.pages[0].parts, kPageHasClosed | kPageHasOpen | kPageHasMarks);
-    EXPECT_EQ(built.header.version, kMarkedFileVersion);
+    EXPECT_EQ(built.header.version, kFineSlabsFileVersion);
+    EXPECT_EQ(built.header.flags, kFlagCovering | kFlagParts | kFlagMarks | kFlagFineSlabs);
     uint64_t closed = 0, open = 0;
     for (uint64_t i = 0; i < built.header.pages; ++i) {
         const PageEntry& page = built.pages[i];
@@ -325,7 +326,7 @@ TEST_F(Build, ADensePageFitsTheLeastMemory) {
     BuildOptions o = options({ply(mesh)});
     o.cell = 1;
     ASSERT_TRUE(buildOctree(o).ok());
-    EXPECT_EQ(dataset().pages.size(), 3u);
+    EXPECT_EQ(dataset().pages.size(), 4u);
     const std::string bytes = contentOf(o.output);
     o.memoryBytes = 150 << 20;
     const auto report = buildOctree(o);

@@ -55,7 +55,7 @@ TEST_F(ImageBuild, KeepsImagesAndWhereTheyLie) {
     ASSERT_TRUE(cache.ok() && cache->loadAll().ok());
     const Dataset& dataset = cache->dataset();
     const FileHeader& h = dataset.header;
-    EXPECT_EQ(h.version, kColourErrorsFileVersion);
+    EXPECT_EQ(h.version, kFineSlabsFileVersion);
     EXPECT_TRUE(dataset.hasImages());
     EXPECT_EQ(h.images.images, 2u);
     EXPECT_EQ(h.images.materials, 2u);

@@ -92,7 +92,8 @@ void expectRight(const Built& built, size_t rays = 6000, uint32_t coarsest = 0) 
                 ReferenceCaster::create(built.cache(), cut, {.singlePrecision = single, .steps = single ? 8 : 64});
             ASSERT_TRUE(caster.ok());
             RayClassTable table;
-            for (const Ray& ray : raysAt(built, rays, level)) {
+            // Those of the finest level are the same however many levels are above it.
+            for (const Ray& ray : raysAt(built, rays, built.levels() - 1 - level)) {
                 const auto hit = caster->cast({ray.origin, ray.direction});
                 const double slack = single && hit ? kFloatSlack * hit->t : 0;
                 table.add(judge.judge(

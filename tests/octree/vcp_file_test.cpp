@@ -360,7 +360,7 @@ TEST_F(VcpFile, WrongMagicAndVersion) {
     EXPECT_EQ(past.error().code, ErrorCode::Unsupported);
     EXPECT_EQ(
         past.error().line(),
-        "memory.vcp: header: byte 8: file version 2 is not known; this program reads versions 3 to 10: build it again");
+        "memory.vcp: header: byte 8: file version 2 is not known; this program reads versions 3 to 11: build it again");
 }
 
 TEST_F(VcpFile, HeaderLiesAreFound) {
@@ -539,7 +539,19 @@ Result<Dataset> datasetOfSlabs(uint8_t p95, uint8_t max, uint32_t flags) {
     return readDataset(MemoryFile(bytesOf(folder / "one.vcp")));
 }
 
-TEST(VcpFileVersion, ColourErrorsAskForTheNewestVersion) {
+TEST(VcpFileVersion, FineSlabsAskForTheNewestVersion) {
+    const auto fine = datasetOfSlabs(9, 20, kFlagColour | kFlagCovering | kFlagFineSlabs);
+    ASSERT_TRUE(fine.ok()) << fine.error().line();
+    EXPECT_EQ(fine->header.version, kFineSlabsFileVersion);
+    EXPECT_EQ(fine->header.flags, kFlagColour | kFlagCovering | kFlagFineSlabs | kFlagColourErrors);
+    EXPECT_EQ(fine->slabEdgeOf(0), 0.5);
+    EXPECT_EQ(datasetOfSlabs(9, 20, kFlagColour | kFlagCovering)->slabEdgeOf(0), 1);
+    const auto wrong = datasetOfSlabs(9, 20, kFlagColour | kFlagFineSlabs);
+    ASSERT_FALSE(wrong.ok());
+    EXPECT_NE(wrong.error().line().find("nothing in the flags"), std::string::npos) << wrong.error().line();
+}
+
+TEST(VcpFileVersion, ColourErrorsAskForTheirVersion) {
     const auto with = datasetOfSlabs(9, 20, kFlagColour);
     ASSERT_TRUE(with.ok()) << with.error().line();
     EXPECT_EQ(with->header.version, kColourErrorsFileVersion);

@@ -96,24 +96,44 @@ bool holds(const PageTree& tree, glm::dvec3 p) {
     return false;
 }
 
+/// Whether a quarter of a cell that has point `p` (page space, in quarters) holds it.
+bool holds(const SurfaceQuarters& list, glm::dvec3 p) {
+    for (size_t i = 0; i < list.size(); ++i) {
+        const glm::dvec3 x = p - glm::dvec3(mortonDecode(list.codes[i])) - 0.5;
+        bool isIn = std::max({std::abs(x.x), std::abs(x.y), std::abs(x.z)}) <= 0.5 + 1e-9;
+        for (int k = 0; k < 3; ++k)
+            isIn = isIn && x[k] + 0.5 >= list.boxes[i].lower[k] / 255.0 - 1e-9 &&
+                   x[k] + 0.5 <= list.boxes[i].upper[k] / 255.0 + 1e-9;
+        if (isIn) return true;
+    }
+    return false;
+}
+
 struct FoldedPages {
-    std::vector<SurfaceCells> finest;  ///< the halves of cells of the eight, in octant order, empty ones left out
+    std::vector<PageSurface> finest;  ///< of the eight, in octant order, empty ones left out
     std::vector<uint32_t> octants;
     PageSurface above;
+    /// The octrees of the page above them, and of that above it, whose lowest octant it is.
+    PageTree tree, coarser;
 };
+
+SurfaceBelow handedUp(const PageSurface& surface) { return {surface.halves, slabsOf(surface)}; }
 
 FoldedPages pagesOf(const LatticeMesh& mesh) {
     FoldedPages pages;
     const std::vector<uint32_t> numbers = allOf(mesh);
+    PageFold fold(kSlabLog2Cells, 0, 0), coarser(kSlabLog2Cells, 0, 0);
     for (uint32_t o = 0; o < 8; ++o) {
-        SurfaceCells surface = surfaceOf(mesh, numbers, mortonDecode(o), kSlabLog2Cells);
-        if (surface.size() == 0) continue;
+        PageSurface surface = surfaceOf(mesh, numbers, mortonDecode(o), kSlabLog2Cells);
+        if (surface.halves.size() == 0) continue;
+        fold.add(handedUp(surface), o);
         pages.finest.push_back(std::move(surface));
         pages.octants.push_back(o);
     }
-    PageFold fold(kSlabLog2Cells, 0);
-    for (size_t i = 0; i < pages.finest.size(); ++i) fold.add(pages.finest[i], pages.octants[i]);
-    pages.above = fold.take();
+    pages.above = foldSurface(fold.quarters, false);
+    coarser.add(handedUp(pages.above), 0);
+    pages.tree = slabTree(fold.slabs, kSlabLog2Cells);
+    pages.coarser = slabTree(coarser.slabs, kSlabLog2Cells);
     return pages;
 }
 
@@ -121,7 +141,6 @@ TEST(Slabs, HoldEveryPointOfTheSurface) {
     for (const auto& [name, mesh] : scenes()) {
         SCOPED_TRACE(name);
         const FoldedPages pages = pagesOf(mesh);
-        const PageTree tree = buildSlabTree(pages.above, kSlabLog2Cells);
         std::mt19937 random(7);
         for (int i = 0; i < 3000; ++i) {
             const glm::dvec3 p = pointOf(mesh, random() % mesh.triangles.size(), random);
@@ -129,11 +148,14 @@ TEST(Slabs, HoldEveryPointOfTheSurface) {
             const auto octant = uint32_t(page.x + 2 * page.y + 4 * page.z);
             const auto at = std::find(pages.octants.begin(), pages.octants.end(), octant);
             ASSERT_NE(at, pages.octants.end());
-            const SurfaceCells& halves = pages.finest[size_t(at - pages.octants.begin())];
-            ASSERT_TRUE(holds(halves, (p - page * kEdge) * 2.0));
-            ASSERT_TRUE(holds(foldCells(halves), p - page * kEdge));
+            const PageSurface& surface = pages.finest[size_t(at - pages.octants.begin())];
+            ASSERT_TRUE(holds(surface.quarters, (p - page * kEdge) * 4.0));
+            ASSERT_TRUE(holds(surface.halves, (p - page * kEdge) * 2.0));
+            ASSERT_TRUE(holds(surface.cells, p - page * kEdge));
+            ASSERT_TRUE(holds(pages.above.quarters, p * 2.0));
             ASSERT_TRUE(holds(pages.above.cells, p / 2.0));
-            ASSERT_TRUE(holds(tree, p / 2.0));
+            ASSERT_TRUE(holds(pages.tree, p / 2.0));
+            ASSERT_TRUE(holds(pages.coarser, p / 4.0));
         }
     }
 }
@@ -149,8 +171,8 @@ TEST(Slabs, CellsHaveTheAreaOfTheMesh) {
         }
         const FoldedPages pages = pagesOf(mesh);
         double finest = 0, above = 0;
-        for (const SurfaceCells& halves : pages.finest)
-            for (const CellSurface& cell : halves.cells) finest += double(cell.area) / 4;
+        for (const PageSurface& surface : pages.finest)
+            for (const CellSurface& cell : surface.halves.cells) finest += double(cell.area) / 4;
         for (const CellSurface& cell : pages.above.cells.cells) above += 4 * double(cell.area);
         EXPECT_NEAR(finest, expected, 1e-5 * expected);
         EXPECT_NEAR(above, expected, 1e-5 * expected);
@@ -170,32 +192,38 @@ std::optional<glm::dvec3> drawnPoint(const SlabLeaf& leaf, std::mt19937& random)
     return leaf.box.centreCells() + leaf.box.edgeCells() * x;
 }
 
+/// Compares what is drawn of a page of slabs with the mesh, in the page's cells. Returns how many leaves are cells of
+/// the level below.
+int expectWithinCertified(const PageTree& tree, const IndexedMesh& inCells) {
+    EXPECT_LE(tree.certifiedError(), std::max(kMostSlabError, kAnySlabError / 2) / 2);
+    EXPECT_TRUE(tree.hard.empty() && tree.soft.empty());
+    const MeshBvh bvh(inCells);
+    std::mt19937 random(3);
+    int drawn = 0, whole = 0;
+    double most = 0;
+    for (const SlabLeaf& leaf : tree.slabs) {
+        whole += leaf.box.edge == kSubcells / 2;
+        for (int i = 0; i < 20; ++i) {
+            const auto p = drawnPoint(leaf, random);
+            if (!p) continue;
+            const double distance = bvh.nearestPoint(*p)->distance;
+            EXPECT_LE(distance, leaf.error * leaf.box.edgeCells() + 1e-9);
+            most = std::max(most, distance);
+            ++drawn;
+        }
+    }
+    EXPECT_GT(drawn, 1000);
+    EXPECT_GT(most, tree.certifiedError() / 8) << "the bound says nothing";
+    return whole;
+}
+
 TEST(Slabs, WhatIsDrawnIsWithinTheCertifiedErrorOfTheMesh) {
     for (const auto& [name, mesh] : scenes()) {
         SCOPED_TRACE(name);
         const FoldedPages pages = pagesOf(mesh);
-        const PageTree tree = buildSlabTree(pages.above, kSlabLog2Cells);
-        EXPECT_LE(tree.certifiedError(), std::max(kMostSlabError, kAnySlabError / 2));
-        EXPECT_TRUE(tree.hard.empty() && tree.soft.empty());
-        const IndexedMesh inCells = test::inCells(mesh, 0.5);
-        const MeshBvh bvh(inCells);
-        std::mt19937 random(3);
-        int drawn = 0, whole = 0;
-        double most = 0;
-        for (const SlabLeaf& leaf : tree.slabs) {
-            whole += leaf.box.edge == kSubcells;
-            for (int i = 0; i < 20; ++i) {
-                const auto p = drawnPoint(leaf, random);
-                if (!p) continue;
-                const double distance = bvh.nearestPoint(*p)->distance;
-                ASSERT_LE(distance, leaf.error * leaf.box.edgeCells() + 1e-9);
-                most = std::max(most, distance);
-                ++drawn;
-            }
-        }
-        EXPECT_GT(drawn, 1000);
-        EXPECT_GT(most, tree.certifiedError() / 8) << "the bound says nothing";
-        EXPECT_GT(whole, std::string_view(name) == "sphere" ? 100 : -1) << "flat enough for whole cells";
+        const int whole = expectWithinCertified(pages.tree, test::inCells(mesh, 0.5));
+        EXPECT_GT(whole, std::string_view(name) == "sphere" ? 1000 : -1) << "flat enough for whole cells";
+        expectWithinCertified(pages.coarser, test::inCells(mesh, 0.25));
     }
 }
 
@@ -206,7 +234,7 @@ TEST(Slabs, AFlatSurfaceHasThinSlabsAlongItsNormal) {
     for (int i = 0; i < 4; ++i)
         mesh.positions.push_back(glm::dvec3(kEdge) + 12.0 * ((i & 1) != 0 ? u : -u) + 12.0 * ((i & 2) != 0 ? v : -v));
     mesh.triangles = {{0, 1, 2}, {1, 3, 2}};
-    const PageTree tree = buildSlabTree(pagesOf(test::onLattice(mesh)).above, kSlabLog2Cells);
+    const PageTree tree = pagesOf(test::onLattice(mesh)).tree;
     ASSERT_GT(tree.slabs.size(), 100u);
     for (const SlabLeaf& leaf : tree.slabs) {
         EXPECT_GT(std::abs(glm::dot(f64::decodeDirection(leaf.code >> kSlabDirectionShift), normal)), std::cos(0.01));
@@ -259,32 +287,41 @@ TEST(Slabs, APageCutPartByPartIsTheSame) {
         SCOPED_TRACE(scene.name);
         for (uint32_t octant = 0; octant < 8; ++octant) {
             const glm::u32vec3 page(octant & 1, octant >> 1 & 1, octant >> 2);
-            const SurfaceCells surface = surfaceOf(scene.mesh, allOf(scene.mesh), page, kSlabLog2Cells);
-            EXPECT_GE(halvesTouched(scene.mesh, allOf(scene.mesh), page, kSlabLog2Cells), surface.size());
-            const StoredPage whole = storedSurface(surface, false);
+            const PageSurface surface = surfaceOf(scene.mesh, allOf(scene.mesh), page, kSlabLog2Cells);
+            EXPECT_GE(halvesTouched(scene.mesh, allOf(scene.mesh), page, kSlabLog2Cells), surface.halves.size());
+            const StoredPage whole = storedSurface(handedUp(surface), false);
             for (const size_t pieces : {size_t{0}, size_t{20}}) {
-                const StoredPage parts =
-                    storedSurface(surfaceOf(scene.mesh, allOf(scene.mesh), page, kSlabLog2Cells, pieces), false);
+                const StoredPage parts = storedSurface(
+                    handedUp(surfaceOf(scene.mesh, allOf(scene.mesh), page, kSlabLog2Cells, pieces)), false);
                 ASSERT_EQ(whole.geometry, parts.geometry) << octant << ", " << pieces << " pieces";
+                ASSERT_EQ(whole.colour, parts.colour) << octant << ", " << pieces << " pieces";
             }
         }
     }
 }
 
 TEST(Slabs, SurfacesComeBackFromTheirBytes) {
-    const SurfaceCells& cells = pagesOf(scenes()[0].mesh).above.quarters;
-    ASSERT_GT(cells.size(), 5000u) << "more than a block";
-    const StoredPage plain = storedSurface(cells, false), coded = storedSurface(cells, true);
+    IndexedMesh mesh = test::sphereMesh(glm::dvec3(kEdge / 2), kEdge * 0.45, 24);
+    const LatticeMesh onLattice = test::onLattice(mesh);
+    const SurfaceBelow surface = handedUp(surfaceOf(onLattice, allOf(onLattice), {0, 0, 0}, kSlabLog2Cells));
+    const SurfaceCells& halves = surface.halves;
+    const StoredPage plain = storedSurface(surface, false), coded = storedSurface(surface, true);
     EXPECT_LT(coded.geometry.size(), plain.geometry.size() * 2 / 3);
+    EXPECT_LT(coded.colour.size(), plain.colour.size());
     for (const StoredPage& stored : {plain, coded}) {
-        EXPECT_EQ(storedCells(stored.geometryBytes), cells.size());
+        EXPECT_EQ(storedCells(stored.geometryBytes), halves.size());
+        EXPECT_EQ(storedSlabs(stored.colourBytes), surface.slabs.size());
         const auto again = surfaceFrom(stored);
         ASSERT_TRUE(again);
-        EXPECT_EQ(again->codes, cells.codes);
+        EXPECT_EQ(again->halves.codes, halves.codes);
         EXPECT_EQ(storedSurface(*again, false).geometry, plain.geometry);
-        for (size_t i = 0; i < cells.size(); ++i) ASSERT_EQ(again->cells[i].axis, cells.cells[i].axis);
+        EXPECT_EQ(storedSurface(*again, false).colour, plain.colour);
+        for (size_t i = 0; i < halves.size(); ++i) ASSERT_EQ(again->halves.cells[i].axis, halves.cells[i].axis);
         StoredPage cut = stored;
         cut.geometry.pop_back();
+        EXPECT_FALSE(surfaceFrom(cut));
+        cut = stored;
+        cut.colour.pop_back();
         EXPECT_FALSE(surfaceFrom(cut));
     }
     EXPECT_EQ(storedSurface({}, true).geometry.size(), 0u);

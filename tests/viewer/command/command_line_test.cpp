@@ -629,7 +629,7 @@ TEST_F(CommandLine, SaysWhetherDistancesOrColoursLimitAPicture) {
         return Json::parse(ran.out);
     };
     const Json any = draw("30,35,0.1", "100", "lit"), near = draw("30,35,0.1", "6", "lit");
-    EXPECT_GT(near["bytes_read"], 5 * double(any["bytes_read"]));
+    EXPECT_GT(near["bytes_read"], 4 * double(any["bytes_read"]));
     EXPECT_EQ(any["colour_pixels"], 0);
     EXPECT_EQ(any["limited_by"], "geometry");
     EXPECT_LE(draw("30,35,0.1", "6", "clay")["bytes_read"], any["bytes_read"]) << "no colour is shown";

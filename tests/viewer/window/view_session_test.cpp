@@ -693,8 +693,9 @@ TEST_F(ViewSessionTest, WhatCannotBeOpenedLeavesWhatIsShown) {
 }
 
 TEST_F(RememberingSessionTest, WhatHasNoRoomLeavesWhatIsShown) {
+    writeBall(*folder_ / "finer.ply", 120, 240);
     BuildOptions build;
-    build.inputs = {*folder_ / "ball.ply"};
+    build.inputs = {*folder_ / "finer.ply"};
     build.output = *folder_ / "one-page.vcp";
     build.cell = 1;
     ASSERT_TRUE(buildOctree(build));
