@@ -28,7 +28,7 @@ std::vector<glm::ivec3> cornersOfBricks(const std::vector<glm::ivec3>& above, co
                                         int edge, int factor) {
     std::vector<glm::ivec3> corners;
     for (uint32_t i = 0; i < upper.entries; ++i) {
-        if (upper.steps[i] != kOccupied) continue;
+        if ((upper.blocks[i] & CompressedMap::kBrick) == 0) continue;
         for (int k = 0; k < factor * factor * factor; ++k)
             corners.push_back(above[i] + edge * glm::ivec3(k % factor, k / factor % factor, k / factor / factor));
     }
@@ -37,21 +37,23 @@ std::vector<glm::ivec3> cornersOfBricks(const std::vector<glm::ivec3>& above, co
 
 void fill(CompressedMap::Level& level, const DistanceMap& map, const std::vector<glm::ivec3>& corners) {
     level.entries = uint32_t(corners.size());
-    level.steps.resize(size_t(map.cones.count()) * corners.size());
-    for (int cone = 0; cone < map.cones.count(); ++cone)
-        for (size_t i = 0; i < corners.size(); ++i)
-            level.steps[cone * corners.size() + i] = leastOf(map, cone, corners[i], level.edge);
-    if (level.edge == 1) return;
-    uint32_t bricks = 0;
-    level.brick.resize(corners.size());
-    for (size_t i = 0; i < corners.size(); ++i) level.brick[i] = level.steps[i] == kOccupied ? bricks++ : 0;
+    for (int cone = 0; cone < map.cones.count(); ++cone) {
+        uint32_t bricks = 0;
+        for (const glm::ivec3 corner : corners) {
+            const uint8_t least = leastOf(map, cone, corner, level.edge);
+            if (level.edge == 1)
+                level.steps.push_back(least);
+            else
+                level.blocks.push_back(least == kOccupied ? CompressedMap::kBrick | bricks++ : least);
+        }
+    }
 }
 
 }  // namespace
 
 uint64_t CompressedMap::bytes() const {
     uint64_t sum = 0;
-    for (const Level& level : levels) sum += level.steps.size() + level.brick.size() * 4;
+    for (const Level& level : levels) sum += level.steps.size() + level.blocks.size() * 4;
     return sum;
 }
 

@@ -77,9 +77,8 @@ void addCompressed(const CompressedMap& map, MarchArrays& arrays) {
     record.top = map.top;
     for (size_t i = 0; i < map.levels.size(); ++i) {
         const auto& level = map.levels[i];
-        const uint32_t steps = add(level.steps, arrays.words);
-        record.levels[i] = {steps, level.entries, uint32_t(level.edge) << 16 | uint32_t(level.factor),
-                            add(level.brick, arrays.words)};
+        const uint32_t first = level.edge > 1 ? add(level.blocks, arrays.words) : add(level.steps, arrays.words);
+        record.levels[i] = {first, level.entries, uint32_t(level.edge) << 16 | uint32_t(level.factor), 0};
     }
 }
 

@@ -50,6 +50,10 @@ cp "$images/../scenes/beads_dog.json" "$scratch"
 # Iterations of five methods on the same rays.
 draw heat '{"asset": "hemispheres", "tiles": 2}' --methods relief-binary,dm,ddm,ddm-quadric,boxes --shading steps --size 200x110 --camera 30,12,1.5
 
+# Two refinements after five steps: binary search, secant; and what is there.
+draw two_refinements '{"asset": "hemispheres", "tiles": 2, "steps": 5, "refinements": 2, "far": false, '"$clay}" \
+    --methods relief-binary,relief-secant,pyramid --size 240x180 --camera 30,25,2
+
 # The ball goes through the maze.
 n=0
 for place in "0.11, 0.11" "0.11, 0.36" "-0.14, 0.36" "-0.39, 0.36"; do

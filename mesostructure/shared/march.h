@@ -19,6 +19,7 @@ INLINE void marchGrid(MesoRay ray, INOUT(MesoResult) result) {
     Walk w = startWalk(ray, meso.cells, meso.extent);
     vec3 heading = w.d * meso.cell;
     int direction = directionOf(heading), guesses = kSkip == kMesoGuess ? meso.guesses : 0;
+    KeptBlock kept = noBlock();
     Side side;
     side.outside = w.startsAtTop || ray.isOutside;
     side.inRun = !ray.isOutside;
@@ -34,7 +35,7 @@ INLINE void marchGrid(MesoRay ray, INOUT(MesoResult) result) {
                 result.state = kMesoUnresolved;
                 return;
             }
-            Space space = spaceAt(direction, w.cell, result.fetches);
+            Space space = spaceAt(direction, w.cell, w.sign, kept, result.fetches);
             exit = walkExit(w, space.further, axisOut);
             found = space.occupied;
             marks = space.marks;

@@ -32,30 +32,60 @@ INLINE Space emptySpace(ivec3 further, float reach) {
     return space;
 }
 
-// Looks up a cell of a compressed map, level by level.
-INLINE Space lookUp(uint cone, ivec3 cell, INOUT(uint) fetches) {
-    ivec3 at = ivec3(wrappedCells(cell.x, cell.y, ivec2(meso.cells)), cell.z);
-    ivec3 block = at / int(meso.levels[0].edgeAndFactor >> 16);
-    uint entry = uint(block.x + meso.top.x * (block.y + meso.top.y * block.z));
-    for (int i = 0; i < meso.levelCount; ++i) {
-        MesoLevel level = meso.levels[i];
-        uint steps = fetchByte(level.first, cone * level.entries + entry);
-        fetches++;
-        if (steps != kMesoOccupied) return emptySpace(ivec3(0), float(steps) * meso.unit);
-        if (i + 1 == meso.levelCount) break;
-        uint below = meso.levels[i + 1].edgeAndFactor;
-        int edge = int(level.edgeAndFactor >> 16), factor = int(below & 0xffffu);
-        ivec3 local = at % edge / int(below >> 16);
-        entry = fetchWord(level.bricks + entry) * uint(factor * factor * factor) +
-                uint(local.x + factor * (local.y + factor * local.z));
-        fetches++;
-    }
-    return occupiedSpace(0u);
+// The block of a compressed map whose entry was read last, and where it leads: cells of a brick are next to each other
+// along a ray, and the way to their brick is read once.
+struct KeptBlock {
+    ivec3 block;  // along the axes, in blocks of the level above the cells
+    uint first;   // the brick's first entry
+};
+
+INLINE KeptBlock noBlock() {
+    KeptBlock kept;
+    kept.block = ivec3(-1);
+    kept.first = 0u;
+    return kept;
 }
 
-// `direction`: the cone, or the octant.
-INLINE Space spaceAt(int direction, ivec3 cell, INOUT(uint) fetches) {
-    if (kSkip == kMesoCompressed) return lookUp(uint(direction), cell, fetches);
+// Looks up a cell of a compressed map, level by level. A block without surface may always be left whole, as a cell may.
+INLINE Space lookUp(uint cone, ivec3 cell, ivec3 sign, INOUT(KeptBlock) kept, INOUT(uint) fetches) {
+    ivec3 at = ivec3(wrappedCells(cell.x, cell.y, ivec2(meso.cells)), cell.z);
+    int last = meso.levelCount - 1, least = int(meso.levels[last - 1].edgeAndFactor >> 16);
+    ivec3 leastBlock = at / least;
+    if (leastBlock != kept.block) {
+        ivec3 block = at / int(meso.levels[0].edgeAndFactor >> 16);
+        uint entry = uint(block.x + meso.top.x * (block.y + meso.top.y * block.z));
+        for (int i = 0; i < last; ++i) {
+            uint word = fetchWord(meso.levels[i].first + cone * meso.levels[i].entries + entry);
+            fetches++;
+            int edge = int(meso.levels[i].edgeAndFactor >> 16);
+            if ((word & kMesoBrick) == 0u) {
+                ivec3 lower = at / edge * edge, upper = min(lower + edge, meso.cells) - 1;
+                ivec3 further =
+                    ivec3(sign.x > 0 ? upper.x - at.x : at.x - lower.x, sign.y > 0 ? upper.y - at.y : at.y - lower.y,
+                          sign.z > 0 ? upper.z - at.z : at.z - lower.z);
+                return emptySpace(further, float(word) * meso.unit);
+            }
+            uint below = meso.levels[i + 1].edgeAndFactor;
+            int factor = int(below & 0xffffu);
+            entry = (word & (kMesoBrick - 1u)) * uint(factor * factor * factor);
+            if (i + 1 == last) break;
+            ivec3 local = at % edge / int(below >> 16);
+            entry += uint(local.x + factor * (local.y + factor * local.z));
+        }
+        kept.block = leastBlock;
+        kept.first = entry;
+    }
+    ivec3 local = at - leastBlock * least;
+    uint steps = fetchByte(meso.levels[last].first, cone * meso.levels[last].entries + kept.first +
+                                                        uint(local.x + least * (local.y + least * local.z)));
+    fetches++;
+    if (steps == kMesoOccupied) return occupiedSpace(0u);
+    return emptySpace(ivec3(0), float(steps) * meso.unit);
+}
+
+// `direction`: the cone, or the octant; `sign`: of the ray's direction.
+INLINE Space spaceAt(int direction, ivec3 cell, ivec3 sign, INOUT(KeptBlock) kept, INOUT(uint) fetches) {
+    if (kSkip == kMesoCompressed) return lookUp(uint(direction), cell, sign, kept, fetches);
     fetches++;
     uint slot = uint(direction) * uint(meso.cellCount) + cellIndex(cell, meso.cells);
     if (kSkip == kMesoBoxes || kSkip == kMesoGuess) {

@@ -20,16 +20,17 @@ const uint kMesoHit = 0u, kMesoMiss = 1u, kMesoUnresolved = 2u;  // the states o
 const uint kMesoMostIterations = 8192u;  // of a walk; then the ray is unresolved
 const uint kMesoMostSteps = 254u;        // the longest length of a distance map
 const uint kMesoOccupied = 255u;         // in place of a length
+const uint kMesoBrick = 0x80000000u;     // in place of a block's length, with the number of its brick
 
 // The word of an occupied cell of octant boxes, and of one that says which of its small cells the surface passes.
 const uint kMesoBoxOccupied = 0x8000u, kMesoSmallCells = 0x4000u;
 
 // A level of a compressed map or of a pyramid.
 struct MesoLevel {
-    uint first;          // word of the steps, or of the maxima
+    uint first;          // word of the entries, or of the maxima
     uint entries;        // of a cone, or of a row
     uint edgeAndFactor;  // (compressed) edge * 65536 + factor
-    uint bricks;         // (compressed) word of the bricks
+    uint unused;
 };
 
 // Where cones meet (meso::ConeBorders).

@@ -239,17 +239,35 @@ TEST(CompressedMap, IsNeverLongerAndKeepsTheSurface) {
         ASSERT_TRUE(compressed.ok());
         const MarchArrays arrays = *gridArrays({.compressed = &*compressed}, {});
         f32::ArrayMarch march{arrays.record, arrays.words.data(), 0, f32::kMesoCompressed, 0, 0};
+        int blocks = 0;
         for (int cone = 0; cone < 8; ++cone)
             for (size_t i = 0; i < occupancy.cells.size(); ++i) {
                 const glm::ivec3 at = map.grid.at(i);
                 uint32_t fetches = 0;
-                const f32::ArrayMarch::Space found =
-                    march.lookUp(uint32_t(cone), at - glm::ivec3(map.grid.cells.x, 0, 0), fetches);
+                // From a tile further left, towards the cone's octant; the way to a brick is read once.
+                const glm::ivec3 sign = 1 - 2 * glm::ivec3(cone & 1, cone >> 1 & 1, cone >> 2);
+                const auto lookUp = [&](f32::ArrayMarch::KeptBlock& kept) {
+                    return march.lookUp(uint32_t(cone), at - glm::ivec3(map.grid.cells.x, 0, 0), sign, kept, fetches);
+                };
+                f32::ArrayMarch::KeptBlock kept = march.noBlock();
+                const f32::ArrayMarch::Space found = lookUp(kept);
                 ASSERT_EQ(found.occupied, occupancy.cells[i] != 0);
                 ASSERT_LE(found.reach, found.occupied ? 0 : map.length(cone, at));
                 ASSERT_GE(fetches, 1u);
-                ASSERT_LE(fetches, 2 * compressed->levels.size() - 1);
+                ASSERT_LE(fetches, compressed->levels.size());
+                for (glm::ivec3 k(0); k.z <= found.further.z; k.z++)
+                    for (k.y = 0; k.y <= found.further.y; k.y++)
+                        for (k.x = 0; k.x <= found.further.x; k.x++)
+                            ASSERT_EQ(occupancy.cells[map.grid.index(at + sign * k)] != 0, found.occupied);
+                blocks += found.further != glm::ivec3(0);
+                const bool isOfBrick = kept.block.x >= 0;
+                fetches = 0;
+                const f32::ArrayMarch::Space again = lookUp(kept);
+                ASSERT_EQ(again.occupied, found.occupied);
+                ASSERT_EQ(again.reach, found.reach);
+                ASSERT_TRUE(fetches == 1 || !isOfBrick);
             }
+        EXPECT_GT(blocks, 0);
         EXPECT_GT(compressed->texelRatio(), factors[0] == 2 ? 0.5 : 1.0);
     }
     EXPECT_LT(compressMap(map, std::vector{4})->bytes(), map.bytes());

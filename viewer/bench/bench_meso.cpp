@@ -171,6 +171,9 @@ std::vector<Entry> entries() {
         all.push_back({fmt::format("steps {} once", steps),
                        false,
                        {.name = "relief-secant", .steps = steps, .refinements = 1, .tolerance = 0}});
+    // The two pictures that Risser et al. print side by side.
+    for (const char* name : {"relief-binary", "relief-secant", "relief-illinois"})
+        all.push_back({"steps 5 refinements 2", false, {.name = name, .steps = 5, .refinements = 2, .tolerance = 0}});
     all.push_back({"exact", true, {.name = "pyramid"}});
     for (const char* name : {"sphere", "dm"})
         for (const int cells : {32, 64, 128})

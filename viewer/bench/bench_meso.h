@@ -71,6 +71,7 @@ struct BenchMesoRow {
     bool hasSolver = false;
     MesoJudged solver;  ///< against the method's own data
     double fetchesMean = 0, iterationsMean = 0, iterationsP95 = 0, surfaceTestsMean = 0;
+    uint64_t surfaceTestsMost = 0;  ///< of one ray
     std::array<double, 4>
         iterationBins{};  ///< parts of the rays: up to 10, 34, 59 iterations, and more (the bins of the paper's Fig. 7)
     double divergence8 = 0;  ///< mean, over groups of 8 rays, of most over mean iterations

@@ -49,6 +49,7 @@ void countWork(const std::vector<MarchResult>& results, BenchMesoRow& row) {
     std::vector<double> iterations;
     for (const MarchResult& r : results) {
         row.fetchesMean += r.fetches, row.iterationsMean += r.iterations, row.surfaceTestsMean += r.surfaceTests;
+        row.surfaceTestsMost = std::max<uint64_t>(row.surfaceTestsMost, r.surfaceTests);
         row.iterationBins[r.iterations <= 10 ? 0 : r.iterations <= 34 ? 1 : r.iterations <= 59 ? 2 : 3] += 1;
         iterations.push_back(r.iterations);
     }

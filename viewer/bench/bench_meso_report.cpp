@@ -30,6 +30,7 @@ Json toJson(const BenchMesoRow& row) {
                  {"iterations_mean", row.iterationsMean},
                  {"iterations_p95", row.iterationsP95},
                  {"surface_tests_mean", row.surfaceTestsMean},
+                 {"surface_tests_max", row.surfaceTestsMost},
                  {"divergence_8", row.divergence8}};
     for (size_t i = 0; i < kMesoClassNames.size(); ++i) json[std::string(kMesoClassNames[i])] = row.shape.fractions[i];
     json["p50_texels"] = row.shape.p50, json["p95_texels"] = row.shape.p95, json["p99_texels"] = row.shape.p99,

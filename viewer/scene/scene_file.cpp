@@ -30,6 +30,7 @@ constexpr size_t kMostPathPoints = 1000;                    // of a surface
 constexpr double kShortestPath = 0.1, kLongestPath = 3600;  // seconds
 constexpr int kDeepestScene = 16;
 constexpr int kMostSteps = 4096;                              // of relief mapping
+constexpr int kMostRefinements = 64;                          // of a step of relief mapping
 constexpr double kSmallestCell = 0.25, kLargestCell = 1000;   // pixels, of remeshing
 constexpr double kSmallestError = 0.05, kLargestError = 100;  // pixels, of remeshing
 // Within this range double precision resolves a millimetre where units are metres, and more.
@@ -193,10 +194,11 @@ private:
         MesoSurfaceDescription made;
         made.method.name = "boxes";
         if (!isObject(json, at)) return made;
-        onlyKeys(json, at, {"asset",  "surface", "subdivide", "tiles",          "height",        "translate", "scale",
-                            "up",     "colour",  "texture",   "normal_texture", "method",        "cell",      "grid",
-                            "cones",  "steps",   "rank",      "directions",     "base",          "far",       "offset",
-                            "filter", "path",    "seconds",   "transfer",       "base_transfer", "error"});
+        onlyKeys(json, at,
+                 {"asset",  "surface", "subdivide",   "tiles",          "height",     "translate",     "scale",
+                  "up",     "colour",  "texture",     "normal_texture", "method",     "cell",          "grid",
+                  "cones",  "steps",   "refinements", "rank",           "directions", "base",          "far",
+                  "offset", "filter",  "path",        "seconds",        "transfer",   "base_transfer", "error"});
         if (!json.contains("asset"))
             wrong(at, "\"asset\" is missing");
         else
@@ -228,6 +230,8 @@ private:
         if (json.contains("grid")) made.method.cells = whole(json["grid"], at + "/grid", meso::kMaxGridEdge);
         if (json.contains("cones")) made.method.cones = cones(json["cones"], at + "/cones");
         if (json.contains("steps")) made.method.steps = whole(json["steps"], at + "/steps", kMostSteps);
+        if (json.contains("refinements"))
+            made.method.refinements = whole(json["refinements"], at + "/refinements", kMostRefinements);
         if (json.contains("rank")) made.method.rank = upTo(json["rank"], at + "/rank", meso::kMostRank);
         if (json.contains("directions")) made.method.directions = directions(json["directions"], at + "/directions");
         if (json.contains("base")) made.withBase = flag(json["base"], at + "/base");

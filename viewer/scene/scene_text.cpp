@@ -58,6 +58,7 @@ OrderedJson surfaceJson(const MesoSurfaceDescription& surface) {
     if (cones.azimuth != usualCones.azimuth || cones.elevation != usualCones.elevation)
         json["cones"] = OrderedJson::array({cones.azimuth, cones.elevation});
     put("steps", surface.method.steps, usual.method.steps);
+    put("refinements", surface.method.refinements, usual.method.refinements);
     put("rank", surface.method.rank, usual.method.rank);
     if (surface.method.directions != usual.method.directions)
         json["directions"] = OrderedJson::array({surface.method.directions.x, surface.method.directions.y});

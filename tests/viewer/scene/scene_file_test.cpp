@@ -146,6 +146,7 @@ TEST(SceneFile, WhatIsWrittenIsReadAgain) {
     surface.method.cells = 32;
     surface.method.cones = {2, 2};
     surface.method.steps = 7;
+    surface.method.refinements = 2;
     surface.method.rank = 0;
     surface.method.directions = {8, 12};
     surface.withBase = surface.withFar = false;
@@ -189,6 +190,7 @@ TEST(SceneFile, WhatIsWrittenIsReadAgain) {
     EXPECT_EQ(read->surfaces[0].method.cells, 32);
     EXPECT_EQ(read->surfaces[0].method.cones.count(), 4);
     EXPECT_EQ(read->surfaces[0].method.steps, 7);
+    EXPECT_EQ(read->surfaces[0].method.refinements, 2);
     EXPECT_EQ(read->surfaces[0].method.rank, 0);
     EXPECT_EQ(read->surfaces[0].method.directions, glm::ivec2(8, 12));
     EXPECT_FALSE(read->surfaces[0].withBase || read->surfaces[0].withFar);
