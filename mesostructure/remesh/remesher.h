@@ -67,6 +67,7 @@ struct RemeshCounts {
     uint64_t tooDeep = 0;            ///< pieces that were halved kMostHalvings times and are drawn as they are
     uint64_t quads = 0, strips = 0;  ///< steps of the sweep; columns that it goes between
     double boundPixels = 0;          ///< most that a point of the mesh is off on the screen
+    uint64_t looked = 0;             ///< texels that certified cells looked at to choose
     uint64_t uncertified = 0;        ///< patches of which boundPixels says nothing (certified_cells.h)
 };
 

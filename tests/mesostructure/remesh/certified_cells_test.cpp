@@ -349,6 +349,25 @@ TEST(CertifiedCells, MeasuringThatIsSharedOutOrCancelledChangesNothing) {
     EXPECT_TRUE(isExpected(meshOf<float>(cancelled, camera, {.errorPixels = 0.5})));
 }
 
+/// A distant view of a repeated tile: patches that repeat are measured once.
+TEST(CertifiedCells, DistantViewsLookAtFewTexels) {
+    const auto viewed = [](double tiles, int texels, std::string_view heights) {
+        const RemeshSurface surface = surfaceOf("quad", tiles, 0.1, heights, texels);
+        CertifiedCells cells = cellsOf(surface);
+        const auto first = meshOf<double>(cells, lookFrom({0.2, 0.3, 4}, {}, 300), {.errorPixels = 0.5});
+        EXPECT_LE(first.counts.boundPixels, 0.5);
+        EXPECT_GT(first.counts.looked, 0u);
+        // What is known is not looked at again.
+        const auto again = meshOf<double>(cells, lookFrom({0.2, 0.3, 4}, {}, 300), {.errorPixels = 0.5});
+        EXPECT_EQ(again.counts.looked, 0u);
+        EXPECT_EQ(again.indices, first.indices);
+        return first.counts;
+    };
+    const RemeshCounts four = viewed(4, 512, "fbm");
+    // Sixteen tiles of 512^2 texels; patches of a tile are seen from different depths.
+    EXPECT_LT(four.looked, uint64_t{16} * 512 * 512 / 4);
+}
+
 TEST(CertifiedCells, RefuseWhatTheyCannotCut) {
     BaseSurface base{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}, {{dvec2(0), dvec2(1e12, 0), dvec2(0, 1e12)}}};
     auto levels = std::make_shared<HeightLevels>(*HeightLevels::build(*makeHeightField("fbm", 16, 1)));
