@@ -225,10 +225,8 @@ void CertifiedCells::limitSteps(const View& view, size_t patch, Seen& seen) cons
     const auto stepOf = [&](double pixels) {
         return std::clamp(finest_ + int(std::floor(std::log2(std::clamp(pixels * texels, 1e-6, 1e6)))), 0, coarsest_);
     };
-    // Normals are those of corners: so that all of the map's are shown, no cell is wider than a texel, or than a pixel
-    // where that is wider.
-    seen.pixel = stepOf(view.cell), seen.widest = std::max(seen.pixel, finest_);
-    seen.narrowest = std::min(stepOf(kNarrowestPixels), seen.widest);
+    // Normals are those of pixels, whatever the triangle: cells are as wide as their error allows.
+    seen.pixel = stepOf(view.cell), seen.widest = coarsest_, seen.narrowest = stepOf(kNarrowestPixels);
 }
 
 void CertifiedCells::measure(Kind& kind, Known& known, double enough, Scratch& scratch) const {
@@ -251,7 +249,7 @@ void CertifiedCells::measure(Kind& kind, Known& known, double enough, Scratch& s
     scratch.mesh.clear();
     const RemeshMath<double>::RemeshView flat{{1, 1, 1, 1}, 0, RemeshMath<double>::kRemeshMap};
     PieceSweep<double> sweep(patches_, {}, flat, scratch.mesh);
-    sweep.sweep(piece, {});
+    sweep.sweep(piece);
     double across = 0, jump = 0;
     DeviationSearch search{.ranges = ranges_.get(), .enough = enough};
     std::vector<std::array<HeightCorner, 3>>& triangles = scratch.over;
@@ -400,8 +398,8 @@ Result<void> remesh(CertifiedCells& cells, const RemeshCamera& camera, const Rem
     VCP_TRY(cells.choose(camera, options, mesh.counts));
     PieceSweep<Real> sweep(cells.patches(), ofMap, remeshViewOf<Real>(camera, ofMap), mesh);
     PieceMaker<Real> maker(cells.patches(), camera, ofMap, mesh.counts, &cells);
-    return maker.run([&](const RemeshPiece<Real>& piece, const RemeshFrame<Real>& frame) -> Result<void> {
-        sweep.sweep(piece, frame);
+    return maker.run([&](const RemeshPiece<Real>& piece) -> Result<void> {
+        sweep.sweep(piece);
         if (mesh.vertices.size() > mostVertices) return tooManyVertices(mostVertices);
         return {};
     });

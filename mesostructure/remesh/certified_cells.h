@@ -51,7 +51,7 @@ public:
     static Result<CertifiedCells> create(const RemeshSurface& surface);
 
     /// Chooses the cells of a view: errors of at most options.errorPixels on the screen, where the finest cells can,
-    /// and none wider than options.cell pixels, or a texel where that is wider. Fills in boundPixels and uncertified.
+    /// and beside a jump of the map at most options.cell pixels wide. Fills in boundPixels, looked and uncertified.
     /// What was measured until options.shareOut cancels stays known. Errors: Cancelled.
     Result<void> choose(const RemeshCamera& camera, const RemeshOptions& options, RemeshCounts& counts);
 

@@ -42,7 +42,7 @@ enum class HeightAccess {
 };
 
 struct RemeshOptions {
-    double cell = 1;         ///< pixels; of certified cells the widest that one may be
+    double cell = 1;         ///< pixels; of certified cells the widest beside a jump of the map
     double errorPixels = 0;  ///< what certified cells may err by; others have one size
     HeightAccess access = HeightAccess::Sample;
     int mostCells = 256;  ///< of an edge that is not halved: 2 to 1024
@@ -55,8 +55,8 @@ struct RemeshOptions {
 template <class Real>
 struct RemeshVertex {
     glm::vec<3, Real> position;  ///< eye space
-    glm::vec<3, Real> normal;    ///< unit, eye space; of the displaced surface
     glm::vec<2, Real> uv;        ///< tile units
+    uint32_t triangle;           ///< of the base, whose frame normals are found in (remesh_frames.h)
 };
 
 struct RemeshCounts {

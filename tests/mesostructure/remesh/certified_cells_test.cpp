@@ -213,10 +213,6 @@ TEST(CertifiedCells, LargerErrorsMakeFewerTriangles) {
         EXPECT_LT(mesh.indices.size(), before * 3 / 4) << allowed;
         before = mesh.indices.size();
     }
-    // The widest cell is kept, too.
-    const auto coarse = meshOf<float>(cells, camera, {.cell = 1000, .errorPixels = 4}),
-               fine = meshOf<float>(cells, camera, {.cell = 4, .errorPixels = 4});
-    EXPECT_GT(fine.indices.size(), 2 * coarse.indices.size());
 }
 
 /// A map that is flat but for one corner needs cells there alone.
@@ -323,7 +319,7 @@ TEST(CertifiedCells, MeasuringThatIsSharedOutOrCancelledChangesNothing) {
         return mesh.indices == expected.indices && mesh.counts.boundPixels == expected.counts.boundPixels &&
                mesh.counts.uncertified == expected.counts.uncertified &&
                std::ranges::equal(mesh.vertices, expected.vertices, [](const auto& a, const auto& b) {
-                   return a.position == b.position && a.normal == b.normal && a.uv == b.uv;
+                   return a.position == b.position && a.triangle == b.triangle && a.uv == b.uv;
                });
     };
     size_t ranges = 0;
