@@ -41,7 +41,7 @@ struct PushedPatch {
     Math::RemeshView view;
     uint32_t levels, mapWidth;
 };
-static_assert(sizeof(PushedPatch) == 112);
+static_assert(sizeof(PushedPatch) == 64);
 
 RemeshProjection projectionOf(const meso::RemeshCamera& camera) {
     const glm::dvec4 s = camera.seen;
@@ -49,8 +49,6 @@ RemeshProjection projectionOf(const meso::RemeshCamera& camera) {
     RemeshProjection made{};
     made.plane = {2 / width, -2 / height, -(s.x + s.z) / width, (s.y + s.w) / height};
     made.depth = {0, camera.nearest, 1, 0};
-    const glm::dvec3 axes[3] = {camera.right, camera.up, camera.forward};
-    for (int i = 0; i < 3; ++i) made.axes[i] = glm::vec4(axes[i], 0);
     return made;
 }
 

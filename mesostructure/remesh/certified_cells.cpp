@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <limits>
+#include <map>
 #include <unordered_map>
 
 #include <glm/common.hpp>
@@ -23,7 +25,8 @@ constexpr double kManyPatches = 1 << 17;
 constexpr int kLog2Narrowest = 4, kLog2Widest = 8;  // texels of a patch's edge
 constexpr int kLog2FinestCells = 4;                 // finest cells of a texel's edge, at most
 constexpr int kLog2MostCells = 9;                   // of a patch's edge; two more bits are there for rounding
-// What is known of a patch is forgotten where it is more than so many combinations of steps.
+// What is known of a kind of patches is forgotten where it is more than so many combinations of steps, and one for
+// each.
 constexpr size_t kMostKnown = 64;
 constexpr double kNarrowestPixels = 0.5;  // of a cell
 constexpr double kNothing = std::numeric_limits<double>::infinity();
@@ -42,6 +45,12 @@ int patchEdge(const RemeshSurface& surface) {
 }
 
 }  // namespace
+
+/// What a thread measures with.
+struct CertifiedCells::Scratch {
+    RemeshMesh<double> mesh;
+    std::vector<std::array<HeightCorner, 3>> over;  ///< its triangles, over the map
+};
 
 /// A camera, and the corners of the patches in its eye space.
 struct CertifiedCells::View {
@@ -68,8 +77,8 @@ Result<CertifiedCells> CertifiedCells::create(const RemeshSurface& surface) {
         auto& grid = made.grids_.emplace_back();
         for (size_t k = 0; k < 3; ++k) grid[k] = glm::ivec2(at[k] - from);
     }
-    made.addEdges(), made.measureCorners();
-    made.known_.resize(made.grids_.size());
+    made.ranges_ = std::make_shared<const HeightRanges>(surface.heights->levels().front());
+    made.addEdges(), made.measureCorners(), made.addKinds();
     return made;
 }
 
@@ -101,6 +110,34 @@ void CertifiedCells::measureCorners() {
         for (uint32_t k = patches_.firstPlace[i]; k < patches_.firstPlace[i + 1]; ++k)
             most = std::max(most, patches_.heights->height(0, dvec2(patches_.places[k])));
         heights_.push_back(most);
+    }
+}
+
+void CertifiedCells::addKinds() {
+    // Corners' places in the tile of the first, their cells, directions and heights; all as words.
+    std::map<std::vector<uint32_t>, uint32_t> numbers;
+    kindOf_.resize(patches_.triangles.size());
+    for (uint32_t i = 0; i < kindOf_.size(); ++i) {
+        const auto& uvs = patches_.uvs[i];
+        const glm::vec2 tile = glm::floor(glm::min(uvs[0], glm::min(uvs[1], uvs[2])));
+        std::vector<uint32_t> key;
+        const auto add = [&](const auto& value) {
+            const size_t at = key.size();
+            key.resize(at + sizeof value / sizeof(uint32_t));
+            std::memcpy(&key[at], &value, sizeof value);
+        };
+        bool mayJump = tile.y != 0 && patches_.heights->rows() != 1;
+        for (size_t k = 0; k < 3; ++k) {
+            const uint32_t corner = patches_.triangles[i][k];
+            add(glm::vec2(uvs[k] - tile)), add(grids_[i][k]), add(patches_.directions[corner]), add(heights_[corner]);
+            mayJump = mayJump || patches_.firstPlace[corner + 1] - patches_.firstPlace[corner] > 1;
+        }
+        // What is beyond a seam is not in the key.
+        if (mayJump) key.assign(1, i);
+        const auto [found, isNew] = numbers.try_emplace(std::move(key), uint32_t(kinds_.size()));
+        if (isNew) kinds_.emplace_back();
+        kindOf_[i] = found->second;
+        kinds_[found->second].patches.push_back(i);
     }
 }
 
@@ -188,13 +225,12 @@ void CertifiedCells::limitSteps(const View& view, size_t patch, Seen& seen) cons
     const auto stepOf = [&](double pixels) {
         return std::clamp(finest_ + int(std::floor(std::log2(std::clamp(pixels * texels, 1e-6, 1e6)))), 0, coarsest_);
     };
-    // Normals are those of corners: so that all of the map's are shown, no cell is wider than a texel, or than a pixel
-    // where that is wider.
-    seen.pixel = stepOf(view.cell), seen.widest = std::max(seen.pixel, finest_);
-    seen.narrowest = std::min(stepOf(kNarrowestPixels), seen.widest);
+    // Normals are those of pixels, whatever the triangle: cells are as wide as their error allows.
+    seen.pixel = stepOf(view.cell), seen.widest = coarsest_, seen.narrowest = stepOf(kNarrowestPixels);
 }
 
-void CertifiedCells::measure(size_t patch, Known& known, double enough, Scratch& scratch) const {
+void CertifiedCells::measure(Kind& kind, Known& known, double enough, Scratch& scratch) const {
+    const size_t patch = kind.patches.front();
     // The sweep moves places as it moves directions; where these lie in the place of those, they come out as they are.
     RemeshPiece<double> piece;
     bool mayJump = false;
@@ -210,20 +246,22 @@ void CertifiedCells::measure(size_t patch, Known& known, double enough, Scratch&
             piece.seams[k] = {true, dvec2(patches_.seamUvs[seam][0]), dvec2(patches_.seamUvs[seam][1])};
     }
     piece.parts = known.cells.parts;
-    scratch.clear();
+    scratch.mesh.clear();
     const RemeshMath<double>::RemeshView flat{{1, 1, 1, 1}, 0, RemeshMath<double>::kRemeshMap};
-    PieceSweep<double> sweep(patches_, {}, flat, scratch);
-    sweep.sweep(piece, {});
-    double height = 0, across = 0, jump = 0;
-    known.isWhole = true;
-    for (size_t i = 0; i < scratch.indices.size() && known.isWhole; i += 3) {
-        std::array<HeightCorner, 3> at;
+    PieceSweep<double> sweep(patches_, {}, flat, scratch.mesh);
+    sweep.sweep(piece);
+    double across = 0, jump = 0;
+    DeviationSearch search{.ranges = ranges_.get(), .enough = enough};
+    std::vector<std::array<HeightCorner, 3>>& triangles = scratch.over;
+    triangles.clear();
+    for (size_t i = 0; i < scratch.mesh.indices.size(); i += 3) {
+        auto& at = triangles.emplace_back();
         std::array<dvec3, 3> directions;
         double least = kNothing, most = -kNothing;
         for (size_t k = 0; k < 3; ++k) {
-            const uint32_t number = scratch.indices[i + k];
-            at[k] = {scratch.vertices[number].uv, sweep.heights()[number]};
-            directions[k] = scratch.vertices[number].position;
+            const uint32_t number = scratch.mesh.indices[i + k];
+            at[k] = {scratch.mesh.vertices[number].uv, sweep.heights()[number]};
+            directions[k] = scratch.mesh.vertices[number].position;
             least = std::min(least, at[k].height), most = std::max(most, at[k].height);
             if (!mayJump) continue;
             const double own = patches_.heights->height(0, at[k].at);
@@ -232,9 +270,16 @@ void CertifiedCells::measure(size_t patch, Known& known, double enough, Scratch&
         double apart = 0;
         for (size_t k = 0; k < 3; ++k) apart = std::max(apart, glm::distance(directions[k], directions[(k + 1) % 3]));
         across = std::max(across, 0.25 * (most - least) * apart);
-        height = std::max(height, heightDeviation(*patches_.heights, at, enough));
-        known.isWhole = !(height > enough);
+        // What the middles of triangles are off leaves less to look for.
+        const dvec2 middle = (at[0].at + at[1].at + at[2].at) / 3.0;
+        search.known = std::max(search.known, std::abs(patches_.heights->height(0, middle) -
+                                                       (at[0].height + at[1].height + at[2].height) / 3));
+        ++search.looked;
     }
+    for (size_t i = 0; i < triangles.size() && !(search.known > enough); ++i)
+        search.known = heightDeviation(*patches_.heights, triangles[i], search);
+    const double height = search.known;
+    known.isWhole = !(height > enough), kind.looked += search.looked;
     // Rounded up, so that what is kept in single precision is no less.
     known.height = std::nextafter(float(height), 2.0f);
     known.jump = std::nextafter(float(jump), 2.0f);
@@ -243,16 +288,17 @@ void CertifiedCells::measure(size_t patch, Known& known, double enough, Scratch&
 
 CertifiedCells::Known& CertifiedCells::known(size_t patch, const Seen& seen, const PatchCells& cells, double allowed,
                                              Scratch& scratch) {
-    auto& all = known_[patch];
+    Kind& kind = kinds_[kindOf_[patch]];
+    auto& all = kind.known;
     auto found = std::ranges::find(all, cells, &Known::cells);
     const bool isNew = found == all.end();
     if (isNew) {
-        if (all.size() >= kMostKnown) all.clear();
+        if (all.size() >= kMostKnown + kind.patches.size()) all.clear();
         all.push_back({.cells = cells}), found = all.end() - 1;
     }
     // Above so much the error is more than is allowed, whatever else there is.
     const double enough = seen.perHeight > 0 ? 1.01 * allowed * seen.depth / seen.perHeight : kNothing;
-    if (isNew || (!found->isWhole && !(double(found->height) > enough))) measure(patch, *found, enough, scratch);
+    if (isNew || (!found->isWhole && !(double(found->height) > enough))) measure(kind, *found, enough, scratch);
     return *found;
 }
 
@@ -299,17 +345,25 @@ Result<void> CertifiedCells::choose(const RemeshCamera& camera, const RemeshOpti
     seen_.resize(patches_.triangles.size()), wanted_.resize(seen_.size());
     const auto wantSteps = [&](size_t first, size_t last) {
         Scratch scratch;
-        for (size_t i = first; i < last; ++i) {
-            seen_[i] = seenIn(view, i);
-            if (seen_[i].is) wanted_[i] = wantedStep(i, seen_[i], options.errorPixels, scratch);
-        }
+        for (size_t kind = first; kind < last; ++kind)
+            for (const uint32_t i : kinds_[kind].patches) {
+                seen_[i] = seenIn(view, i);
+                if (seen_[i].is) wanted_[i] = wantedStep(i, seen_[i], options.errorPixels, scratch);
+            }
     };
+    const auto lookedAt = [&] {
+        uint64_t sum = 0;
+        for (const Kind& kind : kinds_) sum += kind.looked;
+        return sum;
+    };
+    const uint64_t before = lookedAt();
     if (!options.shareOut)
-        wantSteps(0, seen_.size());
-    else if (!options.shareOut(seen_.size(), wantSteps))
+        wantSteps(0, kinds_.size());
+    else if (!options.shareOut(kinds_.size(), wantSteps))
         return Error::cancelled();
     std::ranges::fill(edgeSteps_, coarsest_);
     std::vector<uint32_t> open;
+    Scratch scratch;
     for (uint32_t i = 0; i < seen_.size(); ++i) {
         if (!seen_[i].is) continue;
         for (const uint32_t edge : edges_[i]) edgeSteps_[edge] = std::min(edgeSteps_[edge], wanted_[i]);
@@ -320,17 +374,18 @@ Result<void> CertifiedCells::choose(const RemeshCamera& camera, const RemeshOpti
     while (!open.empty()) {
         const uint32_t patch = open.back();
         open.pop_back();
-        if (!keeps(patch, seen_[patch], cells(patch), options.errorPixels, scratch_)) refine(patch, open);
+        if (!keeps(patch, seen_[patch], cells(patch), options.errorPixels, scratch)) refine(patch, open);
     }
     for (uint32_t i = 0; i < seen_.size(); ++i) {
         if (!seen_[i].is) continue;
-        const Known& of = known(i, seen_[i], cells(i), options.errorPixels, scratch_);
+        const Known& of = known(i, seen_[i], cells(i), options.errorPixels, scratch);
         const double error = pixels(seen_[i], double(of.height) + double(of.jump), double(of.across));
         if (of.isWhole && error <= options.errorPixels)
             counts.boundPixels = std::max(counts.boundPixels, error);
         else
             ++counts.uncertified;
     }
+    counts.looked += lookedAt() - before;
     return {};
 }
 
@@ -343,8 +398,8 @@ Result<void> remesh(CertifiedCells& cells, const RemeshCamera& camera, const Rem
     VCP_TRY(cells.choose(camera, options, mesh.counts));
     PieceSweep<Real> sweep(cells.patches(), ofMap, remeshViewOf<Real>(camera, ofMap), mesh);
     PieceMaker<Real> maker(cells.patches(), camera, ofMap, mesh.counts, &cells);
-    return maker.run([&](const RemeshPiece<Real>& piece, const RemeshFrame<Real>& frame) -> Result<void> {
-        sweep.sweep(piece, frame);
+    return maker.run([&](const RemeshPiece<Real>& piece) -> Result<void> {
+        sweep.sweep(piece);
         if (mesh.vertices.size() > mostVertices) return tooManyVertices(mostVertices);
         return {};
     });

@@ -14,6 +14,9 @@
 // patch, over all depths that it may have. So every point of the picture of the mesh is within so many pixels of the
 // displaced surface's at the same place of the base, and the other way round.
 //
+// Where the map repeats, patches repeat: those with the same texels and directions are measured once (`kinds_`). And
+// only texels are looked at that may change the answer: height_ranges.h says of whole blocks that they do not.
+//
 // What is not certified: the rounding of single precision; what is nearer to the eye than the patch's own size; what
 // would take cells narrower than half a pixel; and where the map jumps along an edge, the slope from the higher side's
 // heights down to the lower side, within cells beside the edge that are at most options.cell pixels wide.
@@ -32,6 +35,8 @@
 
 namespace vcp::meso {
 
+class HeightRanges;
+
 /// How a patch is swept.
 struct PatchCells {
     int step = 0;         ///< its cells are 2^step of the finest ones wide
@@ -46,7 +51,7 @@ public:
     static Result<CertifiedCells> create(const RemeshSurface& surface);
 
     /// Chooses the cells of a view: errors of at most options.errorPixels on the screen, where the finest cells can,
-    /// and none wider than options.cell pixels, or a texel where that is wider. Fills in boundPixels and uncertified.
+    /// and beside a jump of the map at most options.cell pixels wide. Fills in boundPixels, looked and uncertified.
     /// What was measured until options.shareOut cancels stays known. Errors: Cancelled.
     Result<void> choose(const RemeshCamera& camera, const RemeshOptions& options, RemeshCounts& counts);
 
@@ -65,6 +70,12 @@ private:
         float across = 0;     ///< most of the covariance, world units
         bool isWhole = true;  ///< false: it is more than that
     };
+    /// Patches with the same texels and directions: one is measured for all.
+    struct Kind {
+        std::vector<uint32_t> patches;
+        std::vector<Known> known;
+        uint64_t looked = 0;  ///< texels, ever
+    };
     /// What a view makes of errors: pixels are (perHeight height + perUnit across) / (depth - nearer |error|).
     struct Seen {
         bool is = false;
@@ -74,9 +85,10 @@ private:
         double perHeight = 0, perUnit = 0, depth = 1, nearer = 0;
     };
     struct View;
-    using Scratch = RemeshMesh<double>;  ///< what a thread sweeps into
+    struct Scratch;
 
     void addEdges();
+    void addKinds();
     void measureCorners();
     [[nodiscard]] Seen seenIn(const View& view, size_t patch) const;
     [[nodiscard]] double pixels(const Seen& seen, double height, double across) const;
@@ -86,7 +98,7 @@ private:
     int wantedStep(size_t patch, Seen& seen, double allowed, Scratch& scratch);
     /// Returns what is known of a patch's error, exactly where it is at most `allowed` pixels.
     Known& known(size_t patch, const Seen& seen, const PatchCells& cells, double allowed, Scratch& scratch);
-    void measure(size_t patch, Known& known, double enough, Scratch& scratch) const;
+    void measure(Kind& kind, Known& known, double enough, Scratch& scratch) const;
     bool keeps(size_t patch, const Seen& seen, const PatchCells& cells, double allowed, Scratch& scratch);
     void refine(size_t patch, std::vector<uint32_t>& open);
 
@@ -98,10 +110,11 @@ private:
     std::vector<std::array<uint32_t, 2>> neighbours_;  ///< of each edge: one or two patches
     std::vector<int> edgeParts_, edgeSteps_;           ///< of each edge, parts among the finest cells
     std::vector<double> heights_;                      ///< of the corners
-    std::vector<std::vector<Known>> known_;            ///< of each patch
+    std::shared_ptr<const HeightRanges> ranges_;       ///< of the map
+    std::vector<Kind> kinds_;
+    std::vector<uint32_t> kindOf_;  ///< of each patch
     std::vector<Seen> seen_;
     std::vector<int> wanted_;  ///< steps, of each patch that is seen
-    Scratch scratch_;          ///< kept for its memory
 };
 
 /// Adds the surface's triangles with cells of the map to a mesh. Errors: as remesh().

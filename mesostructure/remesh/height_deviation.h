@@ -6,6 +6,7 @@
 #include <glm/vec2.hpp>
 
 #include "mesostructure/remesh/height_levels.h"
+#include "mesostructure/remesh/height_ranges.h"
 
 namespace vcp::meso {
 
@@ -15,9 +16,23 @@ struct HeightCorner {
     double height;  ///< as HeightLevel
 };
 
-/// Returns the most by which the map, bilinear between its texels, differs from what is linear between three corners,
-/// anywhere in the triangle: exact but for rounding, also where the corners lie on a line. Ends at the first difference
-/// above `enough`, which it returns.
-double heightDeviation(const HeightLevels& levels, const std::array<HeightCorner, 3>& corners, double enough = 1e300);
+/// What a search starts and ends with, and what it takes.
+struct DeviationSearch {
+    const HeightRanges* ranges = nullptr;  ///< of the map; null: all of the triangle's texels are looked at
+    double known = 0;                      ///< what cannot be more than this is not looked at
+    double enough = 1e300;                 ///< the search ends at the first difference above it
+    uint64_t looked = 0;                   ///< the texels that were looked at are added
+};
+
+/// Returns the greater of what is known and the most by which the map, bilinear between its texels, differs from what
+/// is linear between three corners, anywhere in the triangle: exact but for rounding, also where the corners lie on a
+/// line. Above `enough` it is some difference that is.
+double heightDeviation(const HeightLevels& levels, const std::array<HeightCorner, 3>& corners, DeviationSearch& search);
+
+/// The same without a search to go on with.
+inline double heightDeviation(const HeightLevels& levels, const std::array<HeightCorner, 3>& corners) {
+    DeviationSearch all;
+    return heightDeviation(levels, corners, all);
+}
 
 }  // namespace vcp::meso

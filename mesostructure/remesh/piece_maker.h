@@ -64,14 +64,14 @@ public:
         points_.heights.from = surface.heights.get(), points_.view = view_;
     }
 
-    /// Hands each piece, with the frame of its base triangle, to `add`, which returns a Result; ends at its first
-    /// error.
+    /// Hands each piece to `add`, which returns a Result; ends at its first error.
     template <class Add>
     Result<void> run(const Add& add) {
         addCorners();
         for (size_t i = 0; i < surface_.triangles.size(); ++i) {
             ++counts_.baseTriangles;
             Piece piece;
+            piece.triangle = surface_.baseTriangles[i];
             for (int k = 0; k < 3; ++k) {
                 piece.corners[k] = corners_[surface_.triangles[i][k]];
                 piece.corners[k].uv = Real2(surface_.uvs[i][k]);
@@ -86,10 +86,9 @@ public:
                 if (const uint32_t seam = surface_.seams[i][k]; seam != RemeshSurface::kNoSeam)
                     piece.seams[k] = {true, Real2(surface_.seamUvs[seam][0]), Real2(surface_.seamUvs[seam][1])};
             }
-            frame_ = frameOf(piece);
             if (cells_ != nullptr) {
                 takeCells(piece, i);
-                VCP_TRY(add(piece, frame_));
+                VCP_TRY(add(piece));
                 continue;
             }
             open_.push_back(piece);
@@ -164,12 +163,12 @@ private:
             if (const int cells = Math::remeshEdge(piece.corners[k].grid, piece.corners[(k + 1) % 3].grid).cells;
                 cells > most)
                 longest = k, most = cells;
-        if (longest < 0) return add(piece, frame_);
+        if (longest < 0) return add(piece);
         if (piece.halvings == kMostHalvings) {
             ++counts_.tooDeep;
             // It is not parted: as if its corners were rounded to one grid point.
             for (Corner& corner : piece.corners) corner.grid = piece.corners[0].grid;
-            return add(piece, frame_);
+            return add(piece);
         }
         halve(piece, longest);
         return {};
@@ -197,26 +196,6 @@ private:
         open_.push_back(second), open_.push_back(first);
     }
 
-    static RemeshFrame<Real> frameOf(const Piece& piece) {
-        const auto& c = piece.corners;
-        RemeshFrame<Real> frame{};
-        // Eye space is left-handed: products are turned.
-        const Real3 flat = glm::cross(c[2].position - c[0].position, c[1].position - c[0].position);
-        const Real length = glm::length(flat);
-        frame.facet = length > 0 ? flat / length : glm::normalize(c[0].direction);
-        const Real2 a = c[1].uv - c[0].uv, b = c[2].uv - c[0].uv;
-        const Real area = a.x * b.y - a.y * b.x;
-        if (!(std::abs(area) > Real(1e-12) * (glm::dot(a, a) + glm::dot(b, b)))) return frame;
-        frame.turned = area > 0 ? Real(-1) : Real(1);
-        const auto byU = [&](const Real3& x, const Real3& y) { return (b.y * x - a.y * y) / area; };
-        const auto byV = [&](const Real3& x, const Real3& y) { return (a.x * y - b.x * x) / area; };
-        const Real3 p1 = c[1].position - c[0].position, p2 = c[2].position - c[0].position,
-                    d1 = c[1].direction - c[0].direction, d2 = c[2].direction - c[0].direction;
-        frame.byU = byU(p1, p2), frame.byV = byV(p1, p2);
-        frame.directionByU = byU(d1, d2), frame.directionByV = byV(d1, d2);
-        return frame;
-    }
-
     const RemeshCamera& camera_;
     const RemeshSurface& surface_;
     const RemeshOptions& options_;
@@ -227,7 +206,6 @@ private:
     std::vector<Corner> corners_;
     std::vector<bool> isMeasured_;
     std::vector<Piece> open_;
-    RemeshFrame<Real> frame_{};
 };
 
 }  // namespace vcp::meso

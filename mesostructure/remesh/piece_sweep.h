@@ -27,7 +27,6 @@ struct SweptPiece {
     typename RemeshMath<Real>::RemeshView view{};
     RemeshMesh<Real>* mesh = nullptr;
     const RemeshPiece<Real>* piece = nullptr;
-    const RemeshFrame<Real>* baseFrame = nullptr;
     std::vector<Real> displaced;  ///< heights of the piece's vertices
     uint32_t numberedFrom = 0;    ///< number of the piece's first vertex
 
@@ -35,15 +34,14 @@ struct SweptPiece {
     [[nodiscard]] glm::ivec3 remeshCell(int k) const { return piece->corners[size_t(k)].grid; }
     [[nodiscard]] const auto& remeshSeam(int k) const { return piece->seams[size_t(k)]; }
     [[nodiscard]] int remeshParts(int k, int cells) const { return piece->parts[k] > 0 ? piece->parts[k] : cells; }
-    [[nodiscard]] const RemeshFrame<Real>& remeshFrame() const { return *baseFrame; }
     [[nodiscard]] RemeshFootprint remeshFootprint(Real texels) { return heights.remeshFootprint(texels); }
     [[nodiscard]] Real remeshHeight(const RemeshFootprint& footprint, const Real2& uv) {
         return heights.remeshHeight(footprint, uv);
     }
     [[nodiscard]] int remeshLevels() const { return heights.remeshLevels(); }
     [[nodiscard]] Real remeshMapWidth() const { return Real(heights.from->levels().front().size.x); }
-    void remeshAddVertex(uint32_t number, const Real3& position, const Real3& normal, const Real2& uv, Real height) {
-        mesh->vertices[number] = {position, normal, uv};
+    void remeshAddVertex(uint32_t number, const Real3& position, const Real2& uv, Real height) {
+        mesh->vertices[number] = {position, uv, piece->triangle};
         displaced[number - numberedFrom] = height;
     }
     void remeshAddTriangle(uint32_t a, uint32_t b, uint32_t c) {
@@ -62,8 +60,8 @@ public:
         sweeping_.heights.from = surface.heights.get(), sweeping_.view = view, sweeping_.mesh = &mesh;
     }
 
-    void sweep(const RemeshPiece<Real>& piece, const RemeshFrame<Real>& frame) {
-        sweeping_.piece = &piece, sweeping_.baseFrame = &frame;
+    void sweep(const RemeshPiece<Real>& piece) {
+        sweeping_.piece = &piece;
         ++mesh_.counts.pieces;
         sweeping_.numberedFrom = uint32_t(mesh_.vertices.size());
         firstIndex_ = mesh_.indices.size();

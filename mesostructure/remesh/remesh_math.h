@@ -8,6 +8,7 @@
 
 #include <glm/common.hpp>
 #include <glm/exponential.hpp>
+#include <glm/geometric.hpp>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 
@@ -44,15 +45,17 @@ struct RemeshMath {
 #define INLINE [[gnu::always_inline]] inline
 #undef CONSTANT
 
-/// The heights of filter levels; `Levels` has RemeshLevel and what remesh_heights.h says.
+/// The heights of filter levels, and normals; `Levels` has RemeshLevel and what remesh_heights.h says.
 template <class T, class Levels>
 struct RemeshHeights : Levels {
     using Real = T;
     using Real2 = glm::vec<2, T>;
+    using Real3 = glm::vec<3, T>;
     using Levels::remeshLevel, Levels::remeshLevels, Levels::remeshTexel;
     using typename Levels::RemeshLevel;
 
 #include "mesostructure/shared/remesh_heights.h"
+#include "mesostructure/shared/remesh_normal.h"
 };
 
 /// The sweep of a piece; `Piece` has what remesh_sweep.h says.
@@ -64,11 +67,11 @@ struct RemeshSweeping : RemeshMath<T>, Piece {
     using Math = RemeshMath<T>;
     using Math::remeshBetween, Math::remeshColumn, Math::remeshDepth, Math::remeshEdge, Math::remeshNearestPart,
         Math::remeshPart, Math::remeshPlan, Math::kRemeshMap, Math::kRemeshMost;
-    using Piece::remeshAddTriangle, Piece::remeshAddVertex, Piece::remeshCell, Piece::remeshCorner, Piece::remeshFrame,
+    using Piece::remeshAddTriangle, Piece::remeshAddVertex, Piece::remeshCell, Piece::remeshCorner,
         Piece::remeshFootprint, Piece::remeshHeight, Piece::remeshLevels, Piece::remeshMapWidth, Piece::remeshParts,
         Piece::remeshSeam, Piece::view;
-    using typename Math::RemeshColumn, typename Math::RemeshCorner, typename Math::RemeshFrame,
-        typename Math::RemeshPlan, typename Math::RemeshSeam;
+    using typename Math::RemeshColumn, typename Math::RemeshCorner, typename Math::RemeshPlan,
+        typename Math::RemeshSeam;
     using typename Piece::RemeshFootprint;
 
 #include "mesostructure/shared/remesh_sweep.h"

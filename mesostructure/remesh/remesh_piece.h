@@ -10,15 +10,14 @@ namespace vcp::meso {
 
 template <class Real>
 using RemeshCorner = typename RemeshMath<Real>::RemeshCorner;
-template <class Real>
-using RemeshFrame = typename RemeshMath<Real>::RemeshFrame;
 
 template <class Real>
 struct RemeshPiece {
     std::array<RemeshCorner<Real>, 3> corners{};
     std::array<typename RemeshMath<Real>::RemeshSeam, 3> seams{};  ///< of the edges from corner k to the next
     int halvings = 0;
-    glm::ivec3 parts{0};  ///< of the edges from corner k to the next, at most their cells; 0: their cells
+    uint32_t triangle = 0;  ///< of the base
+    glm::ivec3 parts{0};    ///< of the edges from corner k to the next, at most their cells; 0: their cells
 };
 
 }  // namespace vcp::meso

@@ -16,22 +16,19 @@ uint32_t word(int x) { return std::bit_cast<uint32_t>(x); }
 glm::uvec4 quad(const glm::vec3& v, float w) { return {word(v.x), word(v.y), word(v.z), word(w)}; }
 glm::uvec4 quad(const glm::vec2& a, const glm::vec2& b) { return {word(a.x), word(a.y), word(b.x), word(b.y)}; }
 
-void addPiece(std::vector<glm::uvec4>& quads, const RemeshPiece<float>& piece, const RemeshFrame<float>& frame) {
+void addPiece(std::vector<glm::uvec4>& quads, const RemeshPiece<float>& piece) {
     const auto& c = piece.corners;
     for (const auto& corner : c) quads.push_back(quad(corner.position, corner.weight));
     for (const auto& corner : c) quads.push_back(quad(corner.direction, corner.density));
     for (const auto& corner : c)
         quads.emplace_back(word(corner.grid.x), word(corner.grid.y), word(corner.grid.z), word(corner.height));
     quads.push_back(quad(c[0].uv, c[1].uv));
-    uint32_t seams = 0;
+    uint32_t seams = piece.triangle << 3;
     for (uint32_t k = 0; k < 3; ++k) seams |= piece.seams[k].is ? 1u << k : 0u;
     uint32_t parts = 0;
     for (int k = 0; k < 3; ++k) parts |= uint32_t(piece.parts[k]) << (10 * k);
     quads.emplace_back(word(c[2].uv.x), word(c[2].uv.y), seams, parts);
     for (const auto& seam : piece.seams) quads.push_back(quad(seam.start, seam.end));
-    quads.push_back(quad(frame.byU, frame.turned));
-    for (const glm::vec3& v : {frame.byV, frame.directionByU, frame.directionByV, frame.facet})
-        quads.push_back(quad(v, 0));
 }
 
 struct PieceSize {
@@ -70,7 +67,7 @@ Result<void> addPieces(const RemeshSurface& surface, const RemeshCamera& camera,
     RemeshBatch* batch = nullptr;
     uint64_t all = 0;
     PieceMaker<float> maker(surface, camera, options, pieces.counts, cells);
-    return maker.run([&](const RemeshPiece<float>& piece, const RemeshFrame<float>& frame) -> Result<void> {
+    return maker.run([&](const RemeshPiece<float>& piece) -> Result<void> {
         const PieceSize size = sizeOf(piece);
         ++pieces.counts.pieces;
         all += size.mostVertices;
@@ -78,7 +75,7 @@ Result<void> addPieces(const RemeshSurface& surface, const RemeshCamera& camera,
         if (batch == nullptr || batch->mostVertices + size.mostVertices > limits.vertices ||
             batch->pieces() >= limits.pieces)
             batch = &nextBatch(pieces);
-        addPiece(batch->quads, piece, frame);
+        addPiece(batch->quads, piece);
         batch->firstColumns.push_back(batch->columns() + size.columns);
         batch->mostVertices += size.mostVertices;
         return {};

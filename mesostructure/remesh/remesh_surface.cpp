@@ -106,12 +106,13 @@ class Cutting {
 public:
     Cutting(const RemeshSurface& from, double mostTexels, uint64_t mostTriangles)
         : most_(mostTexels), mostTriangles_(mostTriangles), texels_(from.heights->texels()), cut_(from) {
-        cut_.triangles.clear(), cut_.uvs.clear(), cut_.seams.clear(), cut_.seamUvs.clear(), cut_.places.clear();
+        cut_.triangles.clear(), cut_.uvs.clear(), cut_.baseTriangles.clear(), cut_.seams.clear(), cut_.seamUvs.clear(),
+            cut_.places.clear();
     }
 
     Result<RemeshSurface> run(const RemeshSurface& from) {
         for (size_t i = 0; i < from.triangles.size(); ++i) {
-            Part part{from.triangles[i], from.uvs[i], {}};
+            Part part{from.triangles[i], from.uvs[i], {}, from.baseTriangles[i]};
             for (int k = 0; k < 3; ++k) {
                 const uint32_t seam = from.seams[i][k];
                 part.beyond[k] = seam != RemeshSurface::kNoSeam
@@ -130,6 +131,7 @@ private:
         std::array<uint32_t, 3> corners;
         std::array<vec2, 3> uvs;
         std::array<std::array<vec2, 2>, 3> beyond;  ///< the other side's coordinates of the edges
+        uint32_t baseTriangle = 0;
     };
 
     [[nodiscard]] double lengthOf(vec2 a, vec2 b) const { return glm::length((dvec2(b) - dvec2(a)) * texels_); }
@@ -146,6 +148,7 @@ private:
                 longest = k, most = length;
         if (longest < 0) {
             cut_.triangles.push_back(part.corners), cut_.uvs.push_back(part.uvs);
+            cut_.baseTriangles.push_back(part.baseTriangle);
         } else {
             halve(part, longest);
         }
@@ -211,6 +214,7 @@ Result<RemeshSurface> buildRemeshSurface(const BaseSurface& base, std::shared_pt
             ++surface.withoutCorners;
             continue;
         }
+        surface.baseTriangles.push_back(uint32_t(surface.triangles.size()));
         surface.triangles.push_back(t);
         surface.uvs.push_back({vec2(base.uvs[i][0]), vec2(base.uvs[i][1]), vec2(base.uvs[i][2])});
         for (const uint32_t corner : t)

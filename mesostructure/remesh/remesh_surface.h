@@ -31,6 +31,7 @@ struct RemeshSurface {
     std::vector<float> densities;       ///< texels a world unit, the most of the triangles at a position
     std::vector<std::array<uint32_t, 3>> triangles;
     std::vector<std::array<glm::vec2, 3>> uvs;      ///< tile units
+    std::vector<uint32_t> baseTriangles;            ///< that they were cut from; uncut: each its own number
     std::vector<std::array<uint32_t, 3>> seams;     ///< of the edges from corner k to the next: number, or kNoSeam
     std::vector<std::array<glm::vec2, 2>> seamUvs;  ///< the other side's, at the edge's start and end
     std::vector<uint32_t> firstPlace;               ///< of each position, and one more

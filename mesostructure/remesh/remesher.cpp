@@ -29,8 +29,8 @@ Result<void> remesh(const RemeshSurface& surface, const RemeshCamera& camera, co
     VCP_TRY(checkRemeshing(options));
     PieceSweep<Real> sweep(surface, options, remeshViewOf<Real>(camera, options), mesh);
     PieceMaker<Real> maker(surface, camera, options, mesh.counts);
-    return maker.run([&](const RemeshPiece<Real>& piece, const RemeshFrame<Real>& frame) -> Result<void> {
-        sweep.sweep(piece, frame);
+    return maker.run([&](const RemeshPiece<Real>& piece) -> Result<void> {
+        sweep.sweep(piece);
         if (mesh.vertices.size() > mostVertices) return tooManyVertices(mostVertices);
         return {};
     });

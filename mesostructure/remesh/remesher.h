@@ -42,7 +42,7 @@ enum class HeightAccess {
 };
 
 struct RemeshOptions {
-    double cell = 1;         ///< pixels; of certified cells the widest that one may be
+    double cell = 1;         ///< pixels; of certified cells the widest beside a jump of the map
     double errorPixels = 0;  ///< what certified cells may err by; others have one size
     HeightAccess access = HeightAccess::Sample;
     int mostCells = 256;  ///< of an edge that is not halved: 2 to 1024
@@ -55,8 +55,8 @@ struct RemeshOptions {
 template <class Real>
 struct RemeshVertex {
     glm::vec<3, Real> position;  ///< eye space
-    glm::vec<3, Real> normal;    ///< unit, eye space; of the displaced surface
     glm::vec<2, Real> uv;        ///< tile units
+    uint32_t triangle;           ///< of the base, whose frame normals are found in (remesh_frames.h)
 };
 
 struct RemeshCounts {
@@ -67,6 +67,7 @@ struct RemeshCounts {
     uint64_t tooDeep = 0;            ///< pieces that were halved kMostHalvings times and are drawn as they are
     uint64_t quads = 0, strips = 0;  ///< steps of the sweep; columns that it goes between
     double boundPixels = 0;          ///< most that a point of the mesh is off on the screen
+    uint64_t looked = 0;             ///< texels that certified cells looked at to choose
     uint64_t uncertified = 0;        ///< patches of which boundPixels says nothing (certified_cells.h)
 };
 

@@ -5,12 +5,19 @@
 //  0 to  2  corners: position, 1 / depth
 //  3 to  5  corners: direction, texels a world unit
 //  6 to  8  corners: cell of the grid, height
-//  9, 10    coordinates of corners 0, 1, 2; bit k: edge k has a seam; parts of edges 0, 1, 2, 10 bits each, low first;
-//           0: an edge has as many as cells
+//  9, 10    coordinates of corners 0, 1, 2; bit k: edge k has a seam, and from bit 3 on the base triangle's number;
+//  parts
+//           of edges 0, 1, 2, 10 bits each, low first; 0: an edge has as many as cells
 // 11 to 13  seams: coordinates of the edge's other side, at its start and its end
-// 14 to 17  frame: by u, turned; by v; direction by u; direction by v
-// 18        frame: the triangle's own normal
 //
 // Of the levels a quad each: the quad at which its heights begin, its width and height, its texels in a tile unit along
 // y; then the heights, eight of 16 bits a quad, the first in a word's low half.
-CONSTANT uint kRemeshPieceQuads = 19u;
+CONSTANT uint kRemeshPieceQuads = 14u;
+
+// Of base triangles (RemeshFrame), after a quad of which the first number is that of the levels:
+//
+// quad      of a triangle
+//  0, 1     derivatives by u and by v of places; the coordinates u and v of the first corner
+//  2, 3     of directions; 2: turned
+//  4, 5     direction of the first corner; the triangle's own normal
+CONSTANT uint kRemeshFrameQuads = 6u;

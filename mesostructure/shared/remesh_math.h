@@ -42,13 +42,6 @@ struct RemeshSeam {
     Real2 start, end;
 };
 
-// Derivatives of a base triangle's places and directions by its texture coordinates; eye space.
-struct RemeshFrame {
-    Real3 byU, byV, directionByU, directionByV;
-    Real3 facet;  // the triangle's own normal
-    Real turned;  // sign of a product of derivatives that points outwards; 0 where the map has no area
-};
-
 // Corners lie at most so many cells from the eye's axis: their differences are whole numbers of 32 bits.
 CONSTANT int kRemeshFarthest = 1000000000;
 

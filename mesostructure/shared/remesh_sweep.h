@@ -4,9 +4,8 @@
 //   RemeshCorner remeshCorner(int k)          the piece's, and of each corner the cell alone, remeshCell(k)
 //   RemeshSeam remeshSeam(int k)              of the edge from corner k to the next
 //   int remeshParts(int k, int cells)         into how many parts that edge is split, at most its cells
-//   RemeshFrame remeshFrame()
 //   remesh_heights.h, and remeshMapWidth(): texels of the map along x
-//   void remeshAddVertex(uint number, Real3 position, Real3 normal, Real2 uv, Real height)
+//   void remeshAddVertex(uint number, Real3 position, Real2 uv, Real height)
 //   void remeshAddTriangle(uint a, uint b, uint c)
 //
 // Vertices are numbered corners first, then the points of the edges 0, 1 and 2, then the grid points column by column.
@@ -52,31 +51,6 @@ INLINE Real remeshHeightAt(CONST_REF(RemeshFootprint) footprint, Real texels, Re
         most = away > Real(0) ? min(most, other) : max(most, other);
     }
     return most;
-}
-
-INLINE Real3 remeshNormal(CONST_REF(RemeshFrame) frame, CONST_REF(RemeshFootprint) footprint, Real texels,
-                          CONST_REF(RemeshPoint) p) {
-    if (frame.turned == Real(0)) return frame.facet;
-    // A map without coarser levels is that of an atlas: a wider look would go beyond the chart.
-    PRECISE Real step = (remeshLevels() == 1 ? Real(1) : max(texels, Real(1))) / remeshMapWidth();
-    PRECISE Real reach = Real(0.5) * step, alongU = Real(0), alongV = Real(0);
-    for (int k = 0; k < 4; ++k) {
-        Real ahead = k % 2 == 0 ? Real(1) : Real(-1);
-        Real2 off = k < 2 ? Real2(ahead * reach, 0) : Real2(0, ahead * reach);
-        Real height = ahead * remeshHeight(footprint, p.uv + off);
-        alongU += k < 2 ? height : Real(0);
-        alongV += k < 2 ? Real(0) : height;
-    }
-    alongU /= step;
-    alongV /= step;
-    PRECISE Real3 u = frame.byU + alongU * p.direction + p.height * frame.directionByU;
-    PRECISE Real3 v = frame.byV + alongV * p.direction + p.height * frame.directionByV;
-    PRECISE Real x = u.y * v.z - v.y * u.z, y = u.z * v.x - v.z * u.x, z = u.x * v.y - v.x * u.y;
-    PRECISE Real square = x * x + y * y + z * z;
-    if (!(square > Real(0))) return frame.facet;
-    PRECISE Real length = sqrt(square) * frame.turned;
-    PRECISE Real3 normal = Real3(x / length, y / length, z / length);
-    return normal;
 }
 
 // What all columns of a piece share.
@@ -337,7 +311,6 @@ INLINE void remeshAddPoints(CONST_REF(RemeshSweep) s, int column, uint insideFir
     }
     int beforeTops = corners + primaries, beforeUprights = beforeTops + tops, beforeInside = beforeUprights + uprights;
     RemeshCorner a = remeshCorner(s.plan.first), b = remeshCorner(s.plan.second), c = remeshCorner(s.plan.apex);
-    RemeshFrame frame = remeshFrame();
     for (int j = 0; j < beforeInside + inside.count; ++j) {
         RemeshPoint point;
         Real2 beyond;
@@ -375,9 +348,8 @@ INLINE void remeshAddPoints(CONST_REF(RemeshSweep) s, int column, uint insideFir
             point.density = corner.density;
             point.height = corner.height;
         }
-        Real texels = remeshTexelsAt(point.position, point.density);
-        RemeshFootprint footprint = remeshFootprint(texels);
         if (ownCorner < 0) {
+            Real texels = remeshTexelsAt(point.position, point.density);
             RemeshFootprint sampled = remeshHeightFootprint(texels);
             point.height = remeshHeightAt(sampled, texels, point.uv, point.position, point.direction);
             // Where the map jumps, an edge's point has the higher of its two sides' heights.
@@ -386,7 +358,7 @@ INLINE void remeshAddPoints(CONST_REF(RemeshSweep) s, int column, uint insideFir
                     max(point.height, remeshHeightAt(sampled, texels, beyond, point.position, point.direction));
         }
         PRECISE Real3 position = point.position + point.height * point.direction;
-        remeshAddVertex(number, position, remeshNormal(frame, footprint, texels, point), point.uv, point.height);
+        remeshAddVertex(number, position, point.uv, point.height);
     }
 }
 

@@ -141,8 +141,9 @@ Result<MesoSet> MesoResources::makeSet(const Bound& bound) const {
     const auto orInput = [&](const MesoTexels* texels) {
         return (texels != nullptr ? texels : bound.input)->view.handle();
     };
+    const VkBufferView words = bound.words->view.handle();
     const VkBufferView views[kMesoBindingCount] = {VK_NULL_HANDLE,
-                                                   bound.words->view.handle(),
+                                                   words != VK_NULL_HANDLE ? words : bound.input->view.handle(),
                                                    bound.words->quads.handle(),
                                                    bound.input->view.handle(),
                                                    VK_NULL_HANDLE,

@@ -3,16 +3,19 @@
 //
 // binding   what                          written by              read by
 //  0        MesoRecord, MesoView          copies                  all
-//  1, 2     words of the asset, as words  CPU (upload)            rays, surface
-//           and as fours
-//  3        rays, or the shell            CPU (upload)            rays, surface
+//  1, 2     words of the asset, as words  CPU (upload)            rays, surface, merge
+//           and as fours; or levels of
+//           heights, as fours alone
+//  3        rays, or the shell; or what   CPU (upload), copies    rays, surface, merge
+//           was rasterized
 //  4        results, or hits              rays, surface           surface, shade, readback
 //  5        picture, of the frame         shade pass, shade       readback, present
 //  6        counters                      surface, shade          readback
 //  7        appearance, textures          CPU (upload)            surface
 //  8, 9     planes of light and depths    gather, scene light,    scene light, shade
 //           of the whole picture          surface
-// 10        light over the base           copies                  surface
+// 10        light over the base; or the   copies, CPU (upload)    surface, merge
+//           frames of base triangles
 //
 // Push constants: the ray of light that is cast, MesoLightRay.
 #pragma once
@@ -87,7 +90,7 @@ public:
 
     struct Bound {
         const Buffer* constants;
-        const MesoTexels *words, *input;
+        const MesoTexels *words, *input;  ///< without a view of words the shaders read fours alone
         const Buffer *hits, *picture, *counters;
         const MesoTexels* look = nullptr;                       ///< null: the shaders read none
         const Buffer *sceneLight = nullptr, *depths = nullptr;  ///< null: surfaces and datasets do not shade each other

@@ -6,6 +6,7 @@
 #include <tuple>
 #include <utility>
 
+#include "mesostructure/remesh/remesh_frames.h"
 #include "render/frame_setup.h"
 #include "render/meso_look.h"
 #include "render/meso_shade_spirv.h"
@@ -51,6 +52,10 @@ Result<void> MesoSurfacePass::setSurfaces(std::span<const MesoSurface> surfaces)
                 kept = std::make_shared<MesoTexels>(std::move(texels));
             }
             made.levels = kept;
+            // A pixel has the number in single precision.
+            if (made.remeshed.surface->triangles.size() >= (size_t{1} << 24))
+                return Error{.code = ErrorCode::Limit, .message = "a remeshed base has less than 2^24 triangles"};
+            VCP_TRY_ASSIGN(made.frames, resources_.vectors(meso::remeshFrames(*made.remeshed.surface)));
         }
         made.arrays = surface.arrays;
         if (surface.arrays) {
@@ -87,7 +92,7 @@ uint64_t MesoSurfacePass::assetBytes() const {
     uint64_t sum = 0;
     for (const Placed& surface : surfaces_) {
         if (surface.remeshed.surface)
-            bytes[surface.levels.get()] = surface.levels->buffer.bytes();
+            bytes[surface.levels.get()] = surface.levels->buffer.bytes(), sum += surface.frames.buffer.bytes();
         else
             bytes[surface.words.get()] = surface.words->buffer.bytes(), sum += surface.shell.buffer.bytes();
         if (surface.look) bytes[surface.look.get()] = surface.look->buffer.bytes();
@@ -109,7 +114,6 @@ Result<void> MesoSurfacePass::makeTarget(MesoTarget& target, PictureSize size, u
     if (remeshed_ > 0) VCP_TRY(raster_.prepare(target.remeshed, size, remeshed_));
     for (const Placed& surface : surfaces_) {
         const bool isRemeshed = surface.remeshed.surface != nullptr;
-        const auto& [hits, normals] = target.remeshed.copies;
         MesoTarget::Drawing drawing;
         VCP_TRY_ASSIGN(drawing.constants, device_.createBuffer(sizeof(MesoConstants), kConstantsUse, MemoryUse::Local));
         MesoTarget::Drawing::BaseLight& light = drawing.baseLight;
@@ -120,11 +124,14 @@ Result<void> MesoSurfacePass::makeTarget(MesoTarget& target, PictureSize size, u
             VCP_TRY_ASSIGN(light.filled, device_.createBuffer(light.texels.buffer.bytes(),
                                                               VK_BUFFER_USAGE_TRANSFER_SRC_BIT, MemoryUse::Upload));
         }
-        VCP_TRY_ASSIGN(drawing.set,
-                       resources_.makeSet({&drawing.constants, isRemeshed ? &normals : surface.words.get(),
-                                           isRemeshed ? &hits : &surface.shell, &target.hits, picture.colours,
-                                           &target.counters, surface.look.get(), picture.sceneLight, picture.depths,
-                                           hasLight ? &light.texels : nullptr}));
+        VCP_TRY_ASSIGN(
+            drawing.set,
+            resources_.makeSet({&drawing.constants, isRemeshed ? surface.levels.get() : surface.words.get(),
+                                isRemeshed ? &target.remeshed.hits : &surface.shell, &target.hits, picture.colours,
+                                &target.counters, surface.look.get(), picture.sceneLight, picture.depths,
+                                isRemeshed ? &surface.frames
+                                : hasLight ? &light.texels
+                                           : nullptr}));
         target.drawings.push_back(std::move(drawing));
     }
     target.size = size, target.planes = planes, target.surfaces = version_, target.picture = picture.colours->handle();

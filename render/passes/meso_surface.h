@@ -106,6 +106,7 @@ private:
         MesoTexels shell;
         RemeshedSurface remeshed;
         std::shared_ptr<MesoTexels> levels;  ///< of the heights of what is remeshed
+        MesoTexels frames;                   ///< of its base triangles
         size_t number = 0;                   ///< among those that are remeshed
         glm::dvec3 origin;
         frame::MesoView view{};  ///< what does not depend on the picture

@@ -15,7 +15,7 @@ namespace vcp {
 namespace {
 
 using Vertex = meso::RemeshVertex<float>;
-static_assert(sizeof(Vertex) == 32);
+static_assert(sizeof(Vertex) == 24);
 
 // Nearer than this part of a surface's size to the eye nothing is drawn.
 constexpr double kNearestPart = 1e-5;
@@ -56,8 +56,8 @@ Result<RasterPipeline> createRemeshPipeline(const Device& device) {
                                            .fragment = kRemeshFragSpirv,
                                            .vertexBytes = sizeof(Vertex),
                                            .attributes = {{VK_FORMAT_R32G32B32_SFLOAT, offsetof(Vertex, position)},
-                                                          {VK_FORMAT_R32G32B32_SFLOAT, offsetof(Vertex, normal)},
-                                                          {VK_FORMAT_R32G32_SFLOAT, offsetof(Vertex, uv)}},
+                                                          {VK_FORMAT_R32G32_SFLOAT, offsetof(Vertex, uv)},
+                                                          {VK_FORMAT_R32_UINT, offsetof(Vertex, triangle)}},
                                            .pushBytes = sizeof(RemeshProjection),
                                            .colours = {kRemeshColours.begin(), kRemeshColours.end()}});
 }
@@ -72,15 +72,12 @@ Result<void> RemeshRaster::prepare(RemeshTarget& target, PictureSize size, size_
     if (size.pixels() > device_.limits().maxTexelBufferElements)
         return tooMany(size.pixels(), device_.limits().maxTexelBufferElements);
     target.images = {};
-    for (MesoTexels& copy : target.copies) {
-        const uint64_t bytes = size.pixels() * sizeof(glm::vec4);
-        VCP_TRY_ASSIGN(
-            copy.buffer,
-            device_.createBuffer(bytes, VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT,
-                                 MemoryUse::Local));
-        VCP_TRY_ASSIGN(copy.view, device_.createTexelView(copy.buffer, kRemeshColours[0], bytes));
-        VCP_TRY_ASSIGN(copy.quads, device_.createTexelView(copy.buffer, VK_FORMAT_R32G32B32A32_UINT, bytes));
-    }
+    const uint64_t bytes = size.pixels() * sizeof(glm::vec4);
+    VCP_TRY_ASSIGN(
+        target.hits.buffer,
+        device_.createBuffer(bytes, VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT,
+                             MemoryUse::Local));
+    VCP_TRY_ASSIGN(target.hits.view, device_.createTexelView(target.hits.buffer, kRemeshColours[0], bytes));
     VCP_TRY_ASSIGN(target.images, RasterTarget::create(device_, pipeline_, kRemeshColours, extent));
     return {};
 }
@@ -122,8 +119,6 @@ void RemeshRaster::record(VkCommandBuffer commands, const RemeshTarget& target, 
     } else {
         projection.depth = {0, nearestOf(drawn), 1, 0};
     }
-    const glm::dvec3 axes[3] = {basis.right, basis.up, basis.forward};
-    for (int i = 0; i < 3; ++i) projection.axes[i] = glm::vec4(axes[i], 0);
     const RemeshDrawing& drawing = target.drawings[number];
     barrierToAll(commands);
     sweep_.record(commands, drawing.batches, *drawn.heights, drawing.view);
@@ -131,7 +126,7 @@ void RemeshRaster::record(VkCommandBuffer commands, const RemeshTarget& target, 
     vkCmdPushConstants(commands, pipeline_.layout(), pipeline_.pushStages(), 0, sizeof projection, &projection);
     drawSwept(commands, drawing.batches);
     vkCmdEndRenderPass(commands);
-    for (size_t i = 0; i < target.copies.size(); ++i) target.images.copy(commands, i, target.copies[i].buffer);
+    target.images.copy(commands, 0, target.hits.buffer);
     barrierToAll(commands);
 }
 

@@ -29,13 +29,14 @@ struct RemeshLook {
 
 /// What remesh.vert and remesh.frag are pushed (shaders/remesh_view.glsl).
 struct RemeshProjection {
-    glm::vec4 plane, depth, axes[3];
+    glm::vec4 plane, depth;
 };
 
-/// Makes the pipeline that draws what was remeshed: depth along the unit ray with the place in the tile, and normals.
+/// Makes the pipeline that draws what was remeshed: depth along the unit ray, the place in the tile and
+/// the base triangle's number.
 /// Errors: as RasterPipeline::create.
 Result<RasterPipeline> createRemeshPipeline(const Device& device);
-inline constexpr std::array<VkFormat, 2> kRemeshColours{VK_FORMAT_R32G32B32A32_SFLOAT, VK_FORMAT_R32G32B32A32_SFLOAT};
+inline constexpr std::array<VkFormat, 1> kRemeshColours{VK_FORMAT_R32G32B32A32_SFLOAT};
 
 /// One surface in one frame.
 struct RemeshDrawing {
@@ -46,7 +47,7 @@ struct RemeshDrawing {
 /// What a frame's remeshed surfaces are drawn into, one after the other.
 struct RemeshTarget {
     RasterTarget images;
-    std::array<MesoTexels, 2> copies;  ///< hits and normals, as remesh.frag writes them
+    MesoTexels hits;  ///< a copy, as remesh.frag writes them
     std::vector<RemeshDrawing> drawings;
     meso::RemeshPieces pieces;   ///< of the last surface; kept for its memory
     double certifiedPixels = 0;  ///< of all surfaces, as meso::RemeshCounts has them

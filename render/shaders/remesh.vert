@@ -4,18 +4,18 @@
 #include "render/shaders/remesh_view.glsl"
 
 layout(location = 0) in vec3 position;  // eye space
-layout(location = 1) in vec3 normal;
-layout(location = 2) in vec2 uv;  // tile units
+layout(location = 1) in vec2 uv;        // tile units
+layout(location = 2) in uint number;    // of the base triangle
 
 layout(location = 0) out vec3 at;
-layout(location = 1) out vec3 pointing;
-layout(location = 2) out vec2 place;
+layout(location = 1) out vec2 place;
+layout(location = 2) flat out uint triangle;
 
 void main() {
     float w = projection.depth.z * position.z + projection.depth.w;
     gl_Position = vec4(position.xy * projection.plane.xy + projection.plane.zw * w,
                        projection.depth.x * position.z + projection.depth.y, w);
     at = position;
-    pointing = normal;
     place = uv;
+    triangle = number;
 }

@@ -12,17 +12,20 @@ layout(set = 0, binding = 2) uniform utextureBuffer firstColumns;
 // Vertices and indices before a column within its workgroup; then before the workgroup, and their sum.
 layout(set = 0, binding = 3, std430) buffer CountBlock { uvec2 counts[]; };
 layout(set = 0, binding = 4, std430) buffer DrawBlock { uint drawn[]; };  // VkDrawIndexedIndirectCommand, and vertices
-layout(set = 0, binding = 5, std430) buffer VertexBlock { vec4 vertices[]; };
+layout(set = 0, binding = 5, std430) buffer VertexBlock { uvec2 vertices[]; };
 layout(set = 0, binding = 6, std430) buffer IndexBlock { uint indices[]; };
 
 const uint kCounted = 256u;  // columns of a workgroup of remesh_count.comp
 
 uint nextIndex;  // of the invocation's triangles
 
-void remeshAddVertex(uint number, vec3 position, vec3 normal, vec2 uv, float height) {
+uint pieceTriangle();
+
+void remeshAddVertex(uint number, vec3 position, vec2 uv, float height) {
     if (number >= mostVertices) return;
-    vertices[2u * number] = vec4(position, normal.x);
-    vertices[2u * number + 1u] = vec4(normal.yz, uv);
+    vertices[3u * number] = floatBitsToUint(position.xy);
+    vertices[3u * number + 1u] = floatBitsToUint(vec2(position.z, uv.x));
+    vertices[3u * number + 2u] = uvec2(floatBitsToUint(uv.y), pieceTriangle());
 }
 
 void remeshAddTriangle(uint a, uint b, uint c) {

@@ -14,16 +14,71 @@ uint fetchHit(uint i) { return hits[i]; }
 #include "render/shared/hit_light.h"
 #include "render/shaders/meso_scene.glsl"
 
+// The levels of the heights, and what the base triangles are over the map.
+#define CONSTANT const
+#define PRECISE
+#include "mesostructure/shared/remesh_layout.h"
+struct RemeshLevel {
+    ivec2 size;
+    vec2 texels;
+    uint first;
+};
+int remeshLevels() { return int(fetchBaseLight(0).x); }
+RemeshLevel remeshLevel(int number) {
+    uvec4 stored = fetchQuad(uint(number));
+    return RemeshLevel(ivec2(stored.yz), vec2(float(stored.y), uintBitsToFloat(stored.w)), stored.x);
+}
+uint remeshTexel(RemeshLevel level, int i) {
+    uint word = fetchQuad(level.first + uint(i >> 3))[i >> 1 & 3];
+    return word >> uint((i & 1) << 4) & 0xffffu;
+}
+#include "mesostructure/shared/remesh_heights.h"
+#include "mesostructure/shared/remesh_normal.h"
+
+RemeshFrame frameOf(uint triangle) {
+    int first = 1 + int(triangle * kRemeshFrameQuads);
+    vec4 u = fetchBaseLight(first), v = fetchBaseLight(first + 1), turned = fetchBaseLight(first + 2);
+    RemeshFrame frame;
+    frame.byU = u.xyz;
+    frame.byV = v.xyz;
+    frame.directionByU = turned.xyz;
+    frame.directionByV = fetchBaseLight(first + 3).xyz;
+    frame.direction = fetchBaseLight(first + 4).xyz;
+    frame.at = vec2(u.w, v.w);
+    frame.facet = fetchBaseLight(first + 5).xyz;
+    frame.turned = turned.w;
+    return frame;
+}
+
+
 void main() {
     uvec2 pixel = gl_GlobalInvocationID.xy;
     if (pixel.x >= view.width || pixel.y >= view.height) return;
     uint index = pixel.y * view.width + pixel.x, plane = view.width * view.height;
     vec4 hit = texelFetch(inputTexels, int(index));
     if (hit.w == 0.0 || !(hit.x < uintBitsToFloat(hits[kMesoPlaneDepth * plane + index]))) return;
-    vec4 surface = uintBitsToFloat(fetchQuad(index));
+    vec2 at = vec2(pixel) + 0.5;
+    vec3 d = normalize(view.forward.xyz + at.x * view.forwardX.xyz + at.y * view.forwardY.xyz);
+    RemeshFrame frame = frameOf(uint(hit.w) - 1u);
+    // Gradients of the place in the tile; along the base, whatever stands on it.
+    vec3 across = cross(frame.byU, frame.byV);
+    float square = max(dot(across, across), 1e-30);
+    vec3 byU = cross(frame.byV, across) / square, byV = cross(across, frame.byU) / square;
+    float width = widthAt(pixel, hit.x) * max(length(byU), length(byV));
+    vec3 n = remeshNormal(frame, width * float(remeshLevel(0).size.x), hit.yz);
     vec4 look = vec4(view.colour, 1.0);
-    if (kTextures != 0u) look.xyz = encodedColour(sampleTexture(view.colours, hit.yz, surface.w).xyz);
-    uint code = max(packHitNormal(surface.xyz), 1u);  // 0 means that a pixel has no mesostructure
+    if (kTextures != 0u) {
+        float footprint = width / max(abs(dot(frame.facet, d)), kLeastSlope);
+        if ((kTextures & kMesoNormals) != 0u) {
+            mat3 tile = tileFrame(mat3(byU, byV, frame.facet));
+            n = normalize(tile * bentNormal(n * tile, sampleTexture(view.normals, hit.yz, footprint).xyz));
+        }
+        if ((kTextures & kMesoColours) != 0u)
+            look.xyz = encodedColour(sampleTexture(view.colours, hit.yz, footprint).xyz);
+    }
+    // A normal that points away from the eye is turned until it does not.
+    if (dot(n, d) > 0.0) n = dot(n, d) > 0.99 ? -d : normalize(n - dot(n, d) * d);
+    uint code = max(packHitNormal(n), 1u);  // 0 means that a pixel has no mesostructure
     hits[kMesoPlaneDepth * plane + index] = floatBitsToUint(hit.x);
     hits[kMesoPlaneNormal * plane + index] = code;
     hits[kMesoPlaneLook * plane + index] = packUnorm4x8(look);
@@ -31,6 +86,6 @@ void main() {
     hits[kMesoPlaneIterations * plane + index] += 1u;
     if (kTransfer != 0u) hits[kMesoPlaneTransfer * plane + index] = 0u;
     if (kScene == 0u) return;
-    // Triangles are as large as pixels: rays of light begin half a pixel above them.
+    // Triangles err by up to a part of a pixel: rays of light begin half a pixel above them.
     keepInScene(index, hit.x, code, max(view.shadowLift, 0.5 * widthAt(pixel, hit.x)), false);
 }

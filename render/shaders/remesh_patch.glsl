@@ -4,13 +4,12 @@
 layout(push_constant) uniform PatchBlock {
     vec4 plane;  // as in remesh_view.glsl
     vec4 depth;
-    mat3x4 axes;
     RemeshView view;
     uint levels, mapWidth;  // of the heights
 };
 
 // The tessellator makes vertices and triangles.
-void remeshAddVertex(uint number, vec3 position, vec3 normal, vec2 uv, float height) {}
+void remeshAddVertex(uint number, vec3 position, vec2 uv, float height) {}
 void remeshAddTriangle(uint a, uint b, uint c) {}
 
 #include "render/shaders/remesh_piece.glsl"

@@ -7,8 +7,8 @@ layout(triangles, equal_spacing, cw) in;
 layout(location = 0) patch in uint patchPiece;
 
 layout(location = 0) out vec3 at;
-layout(location = 1) out vec3 pointing;
-layout(location = 2) out vec2 place;
+layout(location = 1) out vec2 place;
+layout(location = 2) flat out uint triangle;
 
 // A point within the patch, with perspective, without its height.
 RemeshPoint insidePoint(vec3 weights) {
@@ -60,6 +60,6 @@ void main() {
     precise float z = depth.z * position.z + depth.w;
     gl_Position = vec4(position.xy * plane.xy + plane.zw * z, depth.x * position.z + depth.y, z);
     at = position;
-    pointing = remeshNormal(remeshFrame(), footprint, texels, point);
     place = point.uv;
+    triangle = pieceTriangle();
 }

@@ -39,17 +39,8 @@ int remeshParts(int k, int cells) {
     return parts > 0 ? parts : cells;
 }
 
-RemeshFrame remeshFrame() {
-    vec4 byU = pieceReals(14);
-    RemeshFrame frame;
-    frame.byU = byU.xyz;
-    frame.byV = pieceReals(15).xyz;
-    frame.directionByU = pieceReals(16).xyz;
-    frame.directionByV = pieceReals(17).xyz;
-    frame.facet = pieceReals(18).xyz;
-    frame.turned = byU.w;
-    return frame;
-}
+// The number of the base triangle.
+uint pieceTriangle() { return pieceQuad(10).z >> 3; }
 
 struct RemeshLevel {
     ivec2 size;

@@ -3,6 +3,5 @@
 layout(push_constant) uniform ProjectionBlock {
     vec4 plane;  // scale and offset of x and y
     vec4 depth;
-    mat3x4 axes;  // eye space's in the world; the last rows are not used
 }
 projection;

@@ -115,6 +115,25 @@ TEST_F(RemeshedSurfaces, PlateauOnAQuadIsAPlane) {
     }
 }
 
+/// As on marched surfaces: a flat texture changes nothing, and normals are bent along the tile.
+TEST_F(RemeshedSurfaces, TakeNormalTextures) {
+    const double bend = 0.4;
+    const auto texture = [](glm::dvec3 n) {
+        return std::make_shared<const MesoTexture>(
+            makeMesoTexture({4, 4}, std::vector<glm::vec4>(16, glm::vec4(glm::vec3(n), 1))));
+    };
+    const auto normalsOf = [&](const std::shared_ptr<const MesoTexture>& normals) {
+        MesoSurface surface = surfaceOf(plateau(), "quad", 0.5);
+        surface.normals = normals;
+        EXPECT_TRUE(renderer_->setSurfaces(std::span(&surface, 1)).ok());
+        RendererFixture::draw(lookFrom({0, 0, 5}));
+        return (*renderer_->readNormals())[kEdge / 2 * kEdge + kEdge / 2];
+    };
+    EXPECT_GT(normalsOf(texture({0, 0, 1})).z, 0.999f);
+    EXPECT_NEAR(normalsOf(texture({std::sin(bend), 0, std::cos(bend)})).x, std::sin(bend), 5e-3);
+    EXPECT_NEAR(normalsOf(texture({0, std::sin(bend), std::cos(bend)})).y, std::sin(bend), 5e-3);
+}
+
 /// Marched and remeshed surfaces are the same surface; what is nearer is seen, whichever is drawn first.
 TEST_F(RemeshedSurfaces, LookLikeMarchedOnes) {
     Asset asset;

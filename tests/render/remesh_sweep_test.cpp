@@ -81,7 +81,7 @@ protected:
             const auto drawn = *readWords(*device_, swept_[i].drawn, 0, 6);
             EXPECT_LE(drawn[5], pieces_.batches[i].mostVertices);
             const auto indices = *readWords(*device_, swept_[i].indices, 0, drawn[0]);
-            const auto words = *readWords(*device_, swept_[i].vertices, 0, uint64_t{8} * drawn[5]);
+            const auto words = *readWords(*device_, swept_[i].vertices, 0, uint64_t{6} * drawn[5]);
             const uint32_t first = uint32_t(mesh.vertices.size());
             mesh.vertices.resize(first + drawn[5]);
             std::memcpy(mesh.vertices.data() + first, words.data(), words.size() * 4);

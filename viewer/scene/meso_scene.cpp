@@ -97,10 +97,6 @@ public:
             return Error{.code = ErrorCode::Usage,
                          .message = fmt::format(
                              "{} draws nothing that moves: leave \"path\" out, or take another method", kRemeshMethod)};
-        if (!d.normalTexture.empty())
-            return Error{.code = ErrorCode::Usage,
-                         .message = fmt::format("{} takes no normal texture: leave it out, or take another method",
-                                                kRemeshMethod)};
         // Certified cells take heights from the map, and of coarser levels normals alone.
         const bool isLarge = asset.heights->texels.size() > kMostFittedTexels;
         const LevelFit fit = d.errorPixels > 0 || isLarge ? LevelFit::Averaged : LevelFit::Least;
@@ -293,6 +289,7 @@ Result<MesoScene> makeMesoScene(std::span<const MesoSurfaceDescription> descript
             auto surface = remeshing.make(d, *asset, *base);
             if (!surface) return d.from.blamed(surface.error());
             VCP_TRY_ASSIGN(surface->colours, textures.colours(d.colourTexture));
+            VCP_TRY_ASSIGN(surface->normals, textures.normals(d.normalTexture));
             surface->colour = d.colour;
             const RemeshSurface& made = *surface->remeshed.surface;
             scene.bounds = scene.bounds.joined({made.low, made.high});

@@ -60,7 +60,7 @@ struct SurfacePath {
 struct MesoSurfaceDescription {
     std::string asset;           ///< as openMesoAsset
     meso::MethodOptions method;  ///< its name may be kRemeshMethod
-    double cell = 1;             ///< kRemeshMethod: pixels of a cell; with an error, of the widest
+    double cell = 1;             ///< kRemeshMethod: pixels of a cell; with an error, beside jumps of the map
     double errorPixels = 0.5;    ///< kRemeshMethod: what is certified; 0: nothing is, and cells have one size
     std::string base = "quad";   ///< a name of baseSurfaceNames(), or a mesh file with texture coordinates
     double tiles = 4;            ///< tile edges along the base (makeBaseSurface, readBaseMesh)

@@ -128,10 +128,79 @@ TEST(HeightDeviation, OfManyWholeCellsIsTheMostOfDenseSamples) {
 TEST(HeightDeviation, EndsWhereItIsEnough) {
     const HeightLevels levels = noise({64, 64}, 5);
     const Corners corners{{{{0, 0}, 0.5}, {{1, 0}, 0.5}, {{0, 1}, 0.5}}};
-    const double all = heightDeviation(levels, corners), some = heightDeviation(levels, corners, 0.1);
+    DeviationSearch ends{.enough = 0.1};
+    const double all = heightDeviation(levels, corners), some = heightDeviation(levels, corners, ends);
     EXPECT_GT(some, 0.1);
     EXPECT_LT(some, all);
-    EXPECT_EQ(heightDeviation(levels, corners, all), all);
+    DeviationSearch goesOn{.enough = all}, isKnown{.known = 0.9};
+    EXPECT_EQ(heightDeviation(levels, corners, goesOn), all);
+    EXPECT_EQ(heightDeviation(levels, corners, isKnown), 0.9);
+}
+
+TEST(HeightRanges, AreThoseOfTheTexelsOfABlock) {
+    for (const glm::ivec2 size : {glm::ivec2(64, 64), glm::ivec2(61, 23), glm::ivec2(3, 130), glm::ivec2(1, 1)}) {
+        const HeightLevels levels = noise(size, uint32_t(size.x));
+        const HeightLevel& map = levels.levels().front();
+        const HeightRanges ranges(map);
+        for (int level = 0; level < ranges.levels(); ++level) {
+            const int width = HeightRanges::kBlock << level;
+            const glm::ivec2 blocks = ranges.blocks(level);
+            ASSERT_GE(blocks.x * width, size.x);
+            ASSERT_GE(blocks.y * width, size.y);
+            for (int y = 0; y < blocks.y; ++y)
+                for (int x = 0; x < blocks.x; ++x) {
+                    uint16_t least = 65535, most = 0;
+                    for (int j = y * width; j <= std::min((y + 1) * width, size.y); ++j)
+                        for (int i = x * width; i <= std::min((x + 1) * width, size.x); ++i) {
+                            const uint16_t texel = map.texels[size_t(i % size.x + size.x * (j % size.y))];
+                            least = std::min(least, texel), most = std::max(most, texel);
+                        }
+                    ASSERT_LE(ranges.of(level, {x, y}).least, least);
+                    ASSERT_GE(ranges.of(level, {x, y}).most, most);
+                    if (level == 0) {
+                        ASSERT_EQ(ranges.of(level, {x, y}).least, least);
+                        ASSERT_EQ(ranges.of(level, {x, y}).most, most);
+                    }
+                }
+        }
+        EXPECT_EQ(ranges.blocks(ranges.levels() - 1), glm::ivec2(1));
+    }
+}
+
+/// Blocks that are left out change no answer; and most of a smooth map's are.
+TEST(HeightDeviation, IsTheSameWhereBlocksAreLeftOut) {
+    uint64_t looked = 0, all = 0;
+    for (uint32_t seed = 0; seed < 400; ++seed) {
+        SCOPED_TRACE(seed);
+        std::mt19937 random(seed);
+        const glm::ivec2 size = seed % 2 == 0 ? glm::ivec2(128, 128) : glm::ivec2(93, 46);
+        std::vector<uint16_t> texels;
+        for (int j = 0; j < size.y; ++j)
+            for (int i = 0; i < size.x; ++i) {
+                const double x = 6.283185307179586 * i / size.x, y = 6.283185307179586 * j / size.y;
+                texels.push_back(seed % 4 < 2 ? uint16_t(30000 + 20000 * std::sin(x) * std::cos(2 * y))
+                                              : uint16_t(random()));
+            }
+        const HeightLevels levels = levelsOf(size, std::move(texels));
+        const HeightRanges ranges(levels.levels().front());
+        std::uniform_real_distribution<double> place(-2, 2), off(-0.9, 0.9);
+        const dvec2 middle(place(random), place(random));
+        Corners corners;
+        for (HeightCorner& corner : corners) {
+            corner.at = middle + dvec2(off(random), off(random));
+            if (seed % 3 == 0) corner.at = glm::round(corner.at * levels.texels()) / levels.texels();
+            corner.height = levels.height(0, corner.at);
+        }
+        if (seed % 11 == 0) corners[2].at = 0.5 * (corners[0].at + corners[1].at);  // on a line
+        DeviationSearch full, pruned{.ranges = &ranges};
+        const double exact = heightDeviation(levels, corners, full);
+        ASSERT_NEAR(heightDeviation(levels, corners, pruned), exact, 1e-12);
+        ASSERT_LE(pruned.looked, full.looked);
+        DeviationSearch known{.ranges = &ranges, .known = exact};
+        ASSERT_NEAR(heightDeviation(levels, corners, known), exact, 1e-12);
+        if (seed % 4 < 2) looked += known.looked, all += full.looked;
+    }
+    EXPECT_LT(looked, all / 4);
 }
 
 }  // namespace

@@ -295,8 +295,6 @@ TEST(SceneFile, WhatCannotBeRemeshedIsSaid) {
         return scene ? makeMesoScene(scene->surfaces).error().line() : scene.error().line();
     };
     EXPECT_NE(errorOf(R"("asset": "bead")").find("remesh is for height fields; bead is a solid"), std::string::npos);
-    EXPECT_NE(errorOf(R"("asset": "fbm", "normal_texture": "n.png")").find("remesh takes no normal texture"),
-              std::string::npos);
 }
 
 TEST(SceneFile, SurfacesGoAlongPaths) {
