@@ -122,7 +122,7 @@ TEST(FrameLayout, Mesostructure) {
                                                AT(MesoRecord, tolerance),  AT(MesoRecord, unused0),
                                                AT(MesoRecord, levels),     AT(MesoRecord, borders)}));
     EXPECT_EQ(offsets.at("MesoLevel"), (Words{AT(MesoLevel, first), AT(MesoLevel, entries),
-                                              AT(MesoLevel, edgeAndFactor), AT(MesoLevel, bricks)}));
+                                              AT(MesoLevel, edgeAndFactor), AT(MesoLevel, unused)}));
     EXPECT_EQ(offsets.at("MesoBorder"), (Words{AT(MesoBorder, azimuth), AT(MesoBorder, elevation)}));
     EXPECT_EQ(offsets.at("MesoView"), (Words{AT(MesoView, eye),          AT(MesoView, eyeX),
                                              AT(MesoView, eyeY),         AT(MesoView, forward),
