@@ -50,7 +50,6 @@ RemeshFrame frameOf(uint triangle) {
     return frame;
 }
 
-
 void main() {
     uvec2 pixel = gl_GlobalInvocationID.xy;
     if (pixel.x >= view.width || pixel.y >= view.height) return;
