@@ -107,32 +107,32 @@ bool isTooCoarse(double error, const SelectionView& view) { return error > view.
 /// Whether single children may replace a page in their octants: it has to have nodes that lie in one octant each.
 bool canBePartial(const Dataset& dataset, const PageEntry& page) { return dataset.isCovering() && page.leaves > 1; }
 
-/// The error of a page in a view, octant by octant where single children may replace it; 0 outside of the view.
-struct PageError {
-    std::array<double, 8> octant{};  ///< of those that have a child
+/// A page as a view sees it: its error octant by octant where single children may replace it.
+struct PageInView {
+    WorldCube cube;
+    bool isInView, isPartial;
+    std::array<double, 8> error{};  ///< pixels, of octants that have a child; 0 outside of the view
+    uint8_t coarse = 0;             ///< octants in which that is more than the view allows
 
-    PageError(const Dataset& dataset, const PageEntry& page, const SelectionView& view) {
-        if (page.childMask == 0 || !inFrustum(dataset, page, view)) return;
-        const double error = refinedError(dataset, page, view);
-        const WorldCube cube = cubeOf(dataset, page);
-        const bool isPartial = canBePartial(dataset, page);
-        if (!isPartial) octant.fill(projected(error, cube, view));
-        for (uint32_t o = 0; isPartial && o < 8; ++o)
-            if ((page.childMask >> o & 1) != 0) octant[o] = projected(error, cube.octant(o), view);
+    PageInView(const Dataset& dataset, const PageEntry& page, const SelectionView& view)
+        : cube(cubeOf(dataset, page)),
+          isInView(inFrustum(cube.low, cube.low + cube.edge, view)),
+          isPartial(canBePartial(dataset, page)) {
+        if (page.childMask == 0 || !isInView) return;
+        const double length = refinedError(dataset, page, view);
+        if (!isPartial) error.fill(projected(length, cube, view));
+        for (uint32_t o = 0; o < 8; ++o) {
+            if ((page.childMask >> o & 1) == 0) continue;
+            if (isPartial) error[o] = projected(length, cube.octant(o), view);
+            if (isTooCoarse(error[o], view)) coarse = uint8_t(coarse | 1u << o);
+        }
     }
     /// Returns the largest error of some octants.
-    [[nodiscard]] double of(uint8_t octants) const {
+    [[nodiscard]] double errorOf(uint8_t octants) const {
         double most = 0;
         for (uint32_t o = 0; o < 8; ++o)
-            if ((octants >> o & 1) != 0) most = std::max(most, octant[o]);
+            if ((octants >> o & 1) != 0) most = std::max(most, error[o]);
         return most;
-    }
-    /// Returns the octants in which it is more than the view allows.
-    [[nodiscard]] uint8_t tooCoarse(const PageEntry& page, const SelectionView& view) const {
-        uint8_t octants = 0;
-        for (uint32_t o = 0; o < 8; ++o)
-            if (isTooCoarse(octant[o], view)) octants = uint8_t(octants | 1u << o);
-        return octants & page.childMask;
     }
 };
 
@@ -144,22 +144,19 @@ bool holdsOrigins(const WorldCube& cube, const SelectionView& view) {
     return std::abs(glm::dot(middle, forward)) <= glm::dot(half, glm::abs(forward));
 }
 
-/// Returns the octants of a page that errs by so much in the view, whose children it wants. `seen`: what its rays hit;
-/// null: all pages count as hit.
-uint8_t octantsWanted(const Dataset& dataset, uint64_t page, const PageError& error, const SelectionView& view,
+/// Returns the octants whose children a page's view wants. `seen`: what its rays hit; null: all pages count as hit.
+uint8_t octantsWanted(const Dataset& dataset, uint64_t page, const PageInView& inView, const SelectionView& view,
                       const PagesSeen* seen) {
-    const PageEntry& entry = dataset.pages[page];
-    const uint8_t coarse = error.tooCoarse(entry, view);
-    if (seen == nullptr || coarse == 0) return coarse;
-    const WorldCube cube = cubeOf(dataset, entry);
-    if (!canBePartial(dataset, entry))
-        return error.octant[0] > kUnseenErrors * view.errorPixels || seen->contains(page) || holdsOrigins(cube, view)
-                   ? coarse
-                   : uint8_t{0};
+    if (seen == nullptr || inView.coarse == 0) return inView.coarse;
+    const double unseen = kUnseenErrors * view.errorPixels;
+    if (!inView.isPartial)
+        return inView.error[0] > unseen || seen->contains(page) || holdsOrigins(inView.cube, view) ? inView.coarse
+                                                                                                   : uint8_t{0};
     uint8_t wanted = 0;
     for (uint32_t o = 0; o < 8; ++o)
-        if ((coarse >> o & 1) != 0 && (error.octant[o] > kUnseenErrors * view.errorPixels ||
-                                       seen->contains(childIn(entry, o)) || holdsOrigins(cube.octant(o), view)))
+        if ((inView.coarse >> o & 1) != 0 &&
+            (inView.error[o] > unseen || seen->contains(childIn(dataset.pages[page], o)) ||
+             holdsOrigins(inView.cube.octant(o), view)))
             wanted = uint8_t(wanted | 1u << o);
     return wanted;
 }
@@ -170,11 +167,11 @@ Candidate candidate(const ChoosingDataset& of, uint32_t number, uint64_t page) {
     Candidate made{0, page, 0, number};
     for (size_t i = 0; i < of.views.size(); ++i) {
         const SelectionView& view = of.views[i];
-        const PageError error(of.dataset, of.dataset.pages[page], view);
-        const uint8_t octants = octantsWanted(of.dataset, page, error, view, of.seen.empty() ? nullptr : of.seen[i]);
+        const PageInView inView(of.dataset, of.dataset.pages[page], view);
+        const uint8_t octants = octantsWanted(of.dataset, page, inView, view, of.seen.empty() ? nullptr : of.seen[i]);
         if (octants == 0) continue;
         made.octants |= octants;
-        made.error = std::max(made.error, error.of(octants) / std::max(view.errorPixels, kLeastErrorPixels));
+        made.error = std::max(made.error, inView.errorOf(octants) / std::max(view.errorPixels, kLeastErrorPixels));
     }
     return made;
 }
@@ -336,18 +333,18 @@ private:
 
     void visit(const Place& at) {
         const PageEntry& entry = dataset_.pages[at.page];
-        const PageError error(dataset_, entry, view_);
-        const uint8_t asked = octantsWanted(dataset_, at.page, error, view_, seen_);
+        const PageInView inView(dataset_, entry, view_);
+        const uint8_t asked = octantsWanted(dataset_, at.page, inView, view_, seen_);
         const uint8_t wanted = at.isWanted ? count(at.page, asked) : uint8_t{0};
         // What nobody wants any more is drawn as long as it is there, but not where all are relaxed together.
-        const uint8_t allowed = choice_.relaxed ? wanted : error.tooCoarse(entry, view_);
+        const uint8_t allowed = choice_.relaxed ? wanted : inView.coarse;
         const uint8_t there =
             at.isSeen ? octantsWhere(dataset_, entry, allowed, [&](uint64_t child) { return resident_[child] != 0; })
                       : uint8_t{0};
         forEachChild(entry, wanted | there, [&](uint64_t child, uint32_t octant) {
             places_.push_back({child, (wanted >> octant & 1) != 0, (there >> octant & 1) != 0});
         });
-        if (at.isSeen && (there != entry.childMask || there == 0)) draw(at.page, error, asked, there);
+        if (at.isSeen && (there != entry.childMask || there == 0)) draw(at.page, inView, asked, there);
     }
 
     /// Counts a wanted page, and children that are not known. Returns the octants whose children are wanted.
@@ -364,19 +361,17 @@ private:
     }
 
     /// Draws a page but where children are drawn in its place.
-    void draw(uint64_t page, const PageError& error, uint8_t asked, uint8_t there) {
+    void draw(uint64_t page, const PageInView& inView, uint8_t asked, uint8_t there) {
         const PageEntry& entry = dataset_.pages[page];
         const auto own = uint8_t(entry.childMask & ~there);
-        const auto unseen = uint8_t(own & error.tooCoarse(entry, view_) & ~asked);
+        const auto unseen = uint8_t(own & inView.coarse & ~asked);
         drawable_.cut.push_back(page);
         drawable_.pagesUnseen += uint64_t(std::popcount(unseen));
-        const bool isPartial = canBePartial(dataset_, entry);
-        if (isPartial && (there != 0 || unseen != 0)) drawable_.partial.push_back({page, own});
-        if (!inFrustum(dataset_, entry, view_) || (unseen != 0 && unseen == own)) return;
-        const WorldCube cube = cubeOf(dataset_, entry);
-        if (!isPartial || entry.childMask == 0) return show(entry, cube);
+        if (inView.isPartial && (there != 0 || unseen != 0)) drawable_.partial.push_back({page, own});
+        if (!inView.isInView || (unseen != 0 && unseen == own)) return;
+        if (!inView.isPartial || entry.childMask == 0) return show(entry, inView.cube);
         for (uint32_t o = 0; o < 8; ++o)
-            if (((own & ~unseen) >> o & 1) != 0) show(entry, cube.octant(o));
+            if (((own & ~unseen) >> o & 1) != 0) show(entry, inView.cube.octant(o));
     }
 
     /// Counts a page's error, or that of an octant in which it is drawn.

@@ -77,7 +77,6 @@ Result<CertifiedCells> CertifiedCells::create(const RemeshSurface& surface) {
         auto& grid = made.grids_.emplace_back();
         for (size_t k = 0; k < 3; ++k) grid[k] = glm::ivec2(at[k] - from);
     }
-    made.ranges_ = std::make_shared<const HeightRanges>(surface.heights->levels().front());
     made.addEdges(), made.measureCorners(), made.addKinds();
     return made;
 }
@@ -251,7 +250,7 @@ void CertifiedCells::measure(Kind& kind, Known& known, double enough, Scratch& s
     PieceSweep<double> sweep(patches_, {}, flat, scratch.mesh);
     sweep.sweep(piece);
     double across = 0, jump = 0;
-    DeviationSearch search{.ranges = ranges_.get(), .enough = enough};
+    DeviationSearch search{.enough = enough};
     std::vector<std::array<HeightCorner, 3>>& triangles = scratch.over;
     triangles.clear();
     for (size_t i = 0; i < scratch.mesh.indices.size(); i += 3) {
@@ -270,7 +269,7 @@ void CertifiedCells::measure(Kind& kind, Known& known, double enough, Scratch& s
         double apart = 0;
         for (size_t k = 0; k < 3; ++k) apart = std::max(apart, glm::distance(directions[k], directions[(k + 1) % 3]));
         across = std::max(across, 0.25 * (most - least) * apart);
-        // What the middles of triangles are off leaves less to look for.
+        // Of steps that are too wide most are so at the middle of a triangle already.
         const dvec2 middle = (at[0].at + at[1].at + at[2].at) / 3.0;
         search.known = std::max(search.known, std::abs(patches_.heights->height(0, middle) -
                                                        (at[0].height + at[1].height + at[2].height) / 3));

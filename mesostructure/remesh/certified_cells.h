@@ -14,8 +14,7 @@
 // patch, over all depths that it may have. So every point of the picture of the mesh is within so many pixels of the
 // displaced surface's at the same place of the base, and the other way round.
 //
-// Where the map repeats, patches repeat: those with the same texels and directions are measured once (`kinds_`). And
-// only texels are looked at that may change the answer: height_ranges.h says of whole blocks that they do not.
+// Where the map repeats, patches repeat: those with the same texels and directions are measured once (`kinds_`).
 //
 // What is not certified: the rounding of single precision; what is nearer to the eye than the patch's own size; what
 // would take cells narrower than half a pixel; and where the map jumps along an edge, the slope from the higher side's
@@ -34,8 +33,6 @@
 #include "mesostructure/remesh/remesher.h"
 
 namespace vcp::meso {
-
-class HeightRanges;
 
 /// How a patch is swept.
 struct PatchCells {
@@ -110,7 +107,6 @@ private:
     std::vector<std::array<uint32_t, 2>> neighbours_;  ///< of each edge: one or two patches
     std::vector<int> edgeParts_, edgeSteps_;           ///< of each edge, parts among the finest cells
     std::vector<double> heights_;                      ///< of the corners
-    std::shared_ptr<const HeightRanges> ranges_;       ///< of the map
     std::vector<Kind> kinds_;
     std::vector<uint32_t> kindOf_;  ///< of each patch
     std::vector<Seen> seen_;

@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include <glm/geometric.hpp>
-
 namespace vcp::meso {
 
 namespace {
@@ -122,12 +120,8 @@ double deviationAt(const HeightLevel& map, const uint16_t* row, double unit, int
     return most;
 }
 
-/// The whole numbers from `first` to `last` that the cells along an axis of something have.
-struct Cells {
-    int first, last;
-};
-
-Cells cellsAlong(const Part& part, int axis) {
+/// Returns the first and the last of the cells along an axis that something is in.
+std::pair<int, int> cellsAlong(const Part& part, int axis) {
     double low = part.corners[0][axis], high = low;
     for (int k = 1; k < part.count; ++k) {
         low = std::min(low, part.corners[size_t(k)][axis]);
@@ -138,170 +132,39 @@ Cells cellsAlong(const Part& part, int axis) {
     return {int(first), int(std::max(std::ceil(high) - 1, first))};
 }
 
-/// Looks for the most that the map differs from a triangle, in blocks of texels of which that is not known already.
-class Search {
-public:
-    Search(const HeightLevel& map, const Part& triangle, DeviationSearch& search)
-        : map_(map),
-          triangle_(triangle),
-          plane_(triangle),
-          columns_(cellsAlong(triangle, 0)),
-          rows_(cellsAlong(triangle, 1)),
-          search_(search),
-          most_(search.known) {
-        least_ = highest_ = triangle.corners[0].z;
-        for (int k = 1; k < 3; ++k) {
-            least_ = std::min(least_, triangle.corners[size_t(k)].z);
-            highest_ = std::max(highest_, triangle.corners[size_t(k)].z);
-        }
-        const glm::dvec2 a(triangle.corners[1] - triangle.corners[0]), b(triangle.corners[2] - triangle.corners[0]);
-        const double area = a.x * b.y - a.y * b.x;
-        hasPlane_ = std::abs(area) > 1e-6 * (glm::dot(a, a) + glm::dot(b, b));
-        turned_ = area < 0 ? -1 : 1;
-    }
-
-    double run() {
-        constexpr int kFew = HeightRanges::kBlock;
-        const int widest = std::max(columns_.last - columns_.first, rows_.last - rows_.first) + 1;
-        if (search_.ranges == nullptr || search_.ranges->levels() == 0) {
-            look(columns_, rows_);
-            return most_;
-        }
-        int level = 0;
-        while (level + 1 < search_.ranges->levels() && (kFew << level) < widest) ++level;
-        const auto blockOf = [&](int texel, int size, int blocks) {
-            const int tile = remaindered(texel, size).first;
-            return tile * blocks + (texel - tile * size) / (kFew << level);
-        };
-        const glm::ivec2 size = map_.size, blocks = search_.ranges->blocks(level);
-        const int left = blockOf(columns_.first, size.x, blocks.x), right = blockOf(columns_.last, size.x, blocks.x),
-                  low = blockOf(rows_.first, size.y, blocks.y), high = blockOf(rows_.last, size.y, blocks.y);
-        for (int j = low; j <= high; ++j)
-            for (int i = left; i <= right; ++i) searchBlock(level, {i, j});
-        return most_;
-    }
-
-private:
-    /// Returns whole quotient and remainder, of numbers of either sign.
-    static std::pair<int, int> remaindered(int i, int n) {
-        const int rest = wrapped(i, n);
-        return {(i - rest) / n, rest};
-    }
-
-    /// The cells of a block that the triangle's box has.
-    [[nodiscard]] static Cells cellsOf(int level, int block, int blocks, int size, Cells within) {
-        const auto [tile, local] = remaindered(block, blocks);
-        const int width = HeightRanges::kBlock << level, from = tile * size + local * width,
-                  to = tile * size + std::min((local + 1) * width, size) - 1;
-        return {std::max(from, within.first), std::min(to, within.last)};
-    }
-
-    void searchBlock(int level, glm::ivec2 block) {
-        const glm::ivec2 blocks = search_.ranges->blocks(level);
-        const Cells columns = cellsOf(level, block.x, blocks.x, map_.size.x, columns_),
-                    rows = cellsOf(level, block.y, blocks.y, map_.size.y, rows_);
-        if (columns.first > columns.last || rows.first > rows.last || most_ > search_.enough) return;
-        if (mostOver(level, block, columns, rows) <= most_) return;
-        const int side = sideOf(columns, rows);
-        if (side < 0) return;
-        if (level == 0) {
-            side > 0 ? lookAtWhole(columns, rows) : look(columns, rows);
-            return;
-        }
-        const glm::ivec2 finer = search_.ranges->blocks(level - 1);
-        const auto [tileX, x] = remaindered(block.x, blocks.x);
-        const auto [tileY, y] = remaindered(block.y, blocks.y);
-        for (int j = 2 * y; j < std::min(2 * y + 2, finer.y); ++j)
-            for (int i = 2 * x; i < std::min(2 * x + 2, finer.x); ++i)
-                searchBlock(level - 1, {tileX * finer.x + i, tileY * finer.y + j});
-    }
-
-    /// Returns what no difference over a block's cells comes above.
-    [[nodiscard]] double mostOver(int level, glm::ivec2 block, Cells columns, Cells rows) const {
-        const glm::ivec2 blocks = search_.ranges->blocks(level);
-        const HeightRanges::Range& range =
-            search_.ranges->of(level, {wrapped(block.x, blocks.x), wrapped(block.y, blocks.y)});
-        double low = 1e300, high = -1e300;
-        for (const int x : {columns.first, columns.last + 1})
-            for (const int y : {rows.first, rows.last + 1}) {
-                const double at = plane_.at(x, y);
-                low = std::min(low, at), high = std::max(high, at);
-            }
-        // Within the triangle heights are between those of its corners; a sliver's plane is not known well.
-        if (!hasPlane_ || !(low >= least_ && low <= highest_)) low = least_;
-        if (!hasPlane_ || !(high >= least_ && high <= highest_)) high = highest_;
-        return std::max(range.most * (1 / 65535.0) - low, high - range.least * (1 / 65535.0));
-    }
-
-    /// How a block lies: 1 within the triangle, -1 all of it beyond one of the sides, else 0.
-    [[nodiscard]] int sideOf(Cells columns, Cells rows) const {
-        const auto& c = triangle_.corners;
-        const double left = columns.first, right = columns.last + 1, low = rows.first, high = rows.last + 1;
-        bool isWithin = true;
-        for (size_t k = 0; k < 3; ++k) {
-            const glm::dvec3 &a = c[k], &b = c[(k + 1) % 3];
-            const double x = turned_ * (b.x - a.x), y = turned_ * (b.y - a.y);
-            if (x * ((x > 0 ? high : low) - a.y) - y * ((y > 0 ? left : right) - a.x) < 0) return -1;
-            isWithin = isWithin && x * ((x > 0 ? low : high) - a.y) - y * ((y > 0 ? right : left) - a.x) > 0;
-        }
-        return isWithin ? 1 : 0;
-    }
-
-    /// Looks at the texels at the corners of cells that all lie in the triangle.
-    void lookAtWhole(Cells columns, Cells rows) {
-        search_.looked += uint64_t(columns.last - columns.first + 1) * uint64_t(rows.last - rows.first + 1);
-        for (int j = rows.first; j <= rows.last + 1; ++j)
-            most_ = std::max(most_, deviationAt(map_, Rows(map_, j).low, 1 / 65535.0, columns.first, columns.last + 1,
-                                                plane_.at(columns.first, j), plane_.byX()));
-    }
-
-    /// Looks at all the cells of some columns and rows.
-    void look(Cells columns, Cells rows) {
-        for (int j = rows.first; j <= rows.last; ++j) {
-            const Part row = rows_.first == rows_.last ? triangle_ : keptOf(keptOf(triangle_, 1, j, 1), 1, j + 1, -1);
-            if (row.count == 0) continue;
-            const Rows texels(map_, j);
-            const Cells cut = cellsAlong(row, 0);
-            const int left = std::max(cut.first, columns.first), right = std::min(cut.last, columns.last);
-            if (left > right) continue;
-            search_.looked += uint64_t(right - left + 1);
-            const auto [wholeFirst, wholeLast] = plane_.wholeCells(j);
-            const double first = std::max(wholeFirst, double(left)), last = std::min(wholeLast, right + 1.0);
-            if (first < last) {
-                const int a = int(first), b = int(last);
-                most_ = std::max(most_,
-                                 deviationAt(map_, texels.low, texels.unit, a, b, plane_.at(first, j), plane_.byX()));
-                most_ = std::max(
-                    most_, deviationAt(map_, texels.high, texels.unit, a, b, plane_.at(first, j + 1), plane_.byX()));
-            }
-            for (int i = left; i <= right; ++i) {
-                if (i == first && first < last) i = int(last);
-                if (i > right || most_ > search_.enough) break;
-                const Part part = cut.first == cut.last ? row : keptOf(keptOf(row, 0, i, 1), 0, i + 1, -1);
-                if (part.count > 0) most_ = std::max(most_, deviationIn(texels, i, j, part));
-            }
-            if (most_ > search_.enough) return;
-        }
-    }
-
-    const HeightLevel& map_;
-    const Part& triangle_;
-    Plane plane_;
-    Cells columns_, rows_;
-    DeviationSearch& search_;
-    double most_, least_, highest_, turned_;
-    bool hasPlane_;
-};
-
 }  // namespace
 
 double heightDeviation(const HeightLevels& levels, const std::array<HeightCorner, 3>& corners,
                        DeviationSearch& search) {
+    const HeightLevel& map = levels.levels().front();
     const glm::dvec2 texels = levels.texels();
     Part whole;
     whole.count = 3;
     for (size_t k = 0; k < 3; ++k) whole.corners[k] = {corners[k].at * texels, corners[k].height};
-    return Search(levels.levels().front(), whole, search).run();
+    const Plane plane(whole);
+    double most = search.known;
+    const auto [bottom, top] = cellsAlong(whole, 1);
+    for (int j = bottom; j <= top; ++j) {
+        const Part row = bottom == top ? whole : keptOf(keptOf(whole, 1, j, 1), 1, j + 1, -1);
+        if (row.count == 0) continue;
+        const Rows rows(map, j);
+        const auto [left, right] = cellsAlong(row, 0);
+        search.looked += uint64_t(right - left + 1);
+        const auto [first, last] = plane.wholeCells(j);
+        if (first < last) {
+            const int a = int(first), b = int(last);
+            most = std::max(most, deviationAt(map, rows.low, rows.unit, a, b, plane.at(first, j), plane.byX()));
+            most = std::max(most, deviationAt(map, rows.high, rows.unit, a, b, plane.at(first, j + 1), plane.byX()));
+        }
+        for (int i = left; i <= right; ++i) {
+            if (i == first && first < last) i = int(last);
+            if (i > right || most > search.enough) break;
+            const Part part = left == right ? row : keptOf(keptOf(row, 0, i, 1), 0, i + 1, -1);
+            if (part.count > 0) most = std::max(most, deviationIn(rows, i, j, part));
+        }
+        if (most > search.enough) return most;
+    }
+    return most;
 }
 
 }  // namespace vcp::meso

@@ -6,7 +6,6 @@
 #include <glm/vec2.hpp>
 
 #include "mesostructure/remesh/height_levels.h"
-#include "mesostructure/remesh/height_ranges.h"
 
 namespace vcp::meso {
 
@@ -18,10 +17,9 @@ struct HeightCorner {
 
 /// What a search starts and ends with, and what it takes.
 struct DeviationSearch {
-    const HeightRanges* ranges = nullptr;  ///< of the map; null: all of the triangle's texels are looked at
-    double known = 0;                      ///< what cannot be more than this is not looked at
-    double enough = 1e300;                 ///< the search ends at the first difference above it
-    uint64_t looked = 0;                   ///< the texels that were looked at are added
+    double known = 0;       ///< what is known already
+    double enough = 1e300;  ///< the search ends at the first difference above it
+    uint64_t looked = 0;    ///< the texels that were looked at are added
 };
 
 /// Returns the greater of what is known and the most by which the map, bilinear between its texels, differs from what

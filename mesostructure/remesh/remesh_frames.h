@@ -11,13 +11,11 @@
 
 namespace vcp::meso {
 
-/// Returns the frame of a base triangle, world axes. Precondition: the surface
-/// is not cut.
-template <class Real>
-typename RemeshHeights<Real>::RemeshFrame remeshFrame(const RemeshSurface& surface, size_t triangle);
+/// In double precision, for charts may be small.
+using RemeshFrame = RemeshHeights<double>::RemeshFrame;
 
-extern template RemeshHeights<float>::RemeshFrame remeshFrame<float>(const RemeshSurface&, size_t);
-extern template RemeshHeights<double>::RemeshFrame remeshFrame<double>(const RemeshSurface&, size_t);
+/// Returns the frame of a base triangle, world axes. Precondition: the surface is not cut.
+RemeshFrame remeshFrame(const RemeshSurface& surface, size_t triangle);
 
 /// Returns all of them as devices read them (shared/remesh_layout.h).
 std::vector<glm::vec4> remeshFrames(const RemeshSurface& surface);

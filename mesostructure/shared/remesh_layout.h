@@ -6,8 +6,7 @@
 //  3 to  5  corners: direction, texels a world unit
 //  6 to  8  corners: cell of the grid, height
 //  9, 10    coordinates of corners 0, 1, 2; bit k: edge k has a seam, and from bit 3 on the base triangle's number;
-//  parts
-//           of edges 0, 1, 2, 10 bits each, low first; 0: an edge has as many as cells
+//           parts of edges 0, 1, 2, 10 bits each, low first, 0: an edge has as many as cells
 // 11 to 13  seams: coordinates of the edge's other side, at its start and its end
 //
 // Of the levels a quad each: the quad at which its heights begin, its width and height, its texels in a tile unit along

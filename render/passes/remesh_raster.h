@@ -32,9 +32,8 @@ struct RemeshProjection {
     glm::vec4 plane, depth;
 };
 
-/// Makes the pipeline that draws what was remeshed: depth along the unit ray, the place in the tile and
-/// the base triangle's number.
-/// Errors: as RasterPipeline::create.
+/// Makes the pipeline that draws what was remeshed: depth along the unit ray, the place in the tile and the base
+/// triangle's number. Errors: as RasterPipeline::create.
 Result<RasterPipeline> createRemeshPipeline(const Device& device);
 inline constexpr std::array<VkFormat, 1> kRemeshColours{VK_FORMAT_R32G32B32A32_SFLOAT};
 

@@ -250,7 +250,7 @@ TEST(Remesher, NormalsAreThoseOfTheDisplacedSurface) {
             RemeshHeights<double> heights{{&levels}};
             for (size_t i = 0; i < surface.triangles.size(); i += 7) {
                 SCOPED_TRACE(std::string(base) + " " + std::to_string(i));
-                const auto frame = remeshFrame<double>(surface, i);
+                const RemeshFrame frame = remeshFrame(surface, i);
                 const auto& uvs = surface.uvs[i];
                 const dvec2 a(uvs[0]), b = dvec2(uvs[1]) - a, c = dvec2(uvs[2]) - a, middle = a + 0.3 * b + 0.4 * c;
                 const double area = b.x * c.y - c.x * b.y;
