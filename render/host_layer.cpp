@@ -37,17 +37,14 @@ Result<CutScene> CutScene::create(const FileHeader& header, bool withColour, std
         const uint64_t colours = withColour ? entry.colourBytes : 0;
         made.views_.push_back(
             viewOfChecked(each.bytes.first(entry.pageBytes), each.bytes.subspan(entry.pageBytes, colours)));
-        HostPage page{.view = &made.views_.back(),
-                      .number = each.number,
-                      .place = mortonDecode(entry.morton),
-                      .level = entry.level,
-                      .error = float(double(entry.certifiedError) / header.cell),
-                      .parts = entry.parts};
-        if (each.octants == 0) pages.push_back(page);
-        for (uint32_t octants = each.octants; octants != 0; octants &= octants - 1) {
-            page.octant = uint32_t(std::countr_zero(octants));
-            pages.push_back(page);
-        }
+        appendDrawn(pages,
+                    {.view = &made.views_.back(),
+                     .number = each.number,
+                     .place = mortonDecode(entry.morton),
+                     .level = entry.level,
+                     .error = float(double(entry.certifiedError) / header.cell),
+                     .parts = entry.parts},
+                    each.octants);
     }
     VCP_TRY_ASSIGN(made.scene_, HostScene::create(hostGrid(header), pages));
     return made;

@@ -1,5 +1,7 @@
 #include "render/host/host_scene.h"
 
+#include <bit>
+
 #include <fmt/format.h>
 
 #include "octree/surface/morton.h"
@@ -23,6 +25,14 @@ HostGrid hostGrid(const FileHeader& header) {
 
 uint32_t HostScene::rootBits() const { return grid_.log2Cells + grid_.levels - 1 + kMaxSubcellDepth; }
 
+void appendDrawn(std::vector<HostPage>& pages, HostPage page, uint32_t octants) {
+    if (octants == 0) pages.push_back(page);
+    for (; octants != 0; octants &= octants - 1) {
+        page.octant = uint32_t(std::countr_zero(octants));
+        pages.push_back(page);
+    }
+}
+
 Result<HostScene> HostScene::create(const HostGrid& grid, std::span<const HostPage> cut) {
     HostScene scene;
     scene.grid_ = grid;
@@ -30,10 +40,12 @@ Result<HostScene> HostScene::create(const HostGrid& grid, std::span<const HostPa
     return scene;
 }
 
-Result<HostScene> HostScene::create(const PageCache& cache, std::span<const uint64_t> cut) {
+Result<HostScene> HostScene::create(const PageCache& cache, std::span<const uint64_t> cut,
+                                    std::span<const uint8_t> octants) {
     const FileHeader& header = cache.dataset().header;
     std::vector<HostPage> pages;
-    for (const uint64_t number : cut) {
+    for (size_t i = 0; i < cut.size(); ++i) {
+        const uint64_t number = cut[i];
         HostPage page{.view = cache.view(number), .number = number};
         if (!page.view) return badCut(page, "a page of the cut is not loaded");
         const PageEntry& entry = cache.dataset().pages[number];
@@ -41,7 +53,7 @@ Result<HostScene> HostScene::create(const PageCache& cache, std::span<const uint
         page.level = entry.level;
         page.parts = entry.parts;
         page.error = float(double(entry.certifiedError) / header.cell);
-        pages.push_back(page);
+        appendDrawn(pages, page, octants.empty() ? 0 : octants[i]);
     }
     return create(hostGrid(header), pages);
 }

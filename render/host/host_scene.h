@@ -37,6 +37,9 @@ struct HostPage {
     uint8_t parts = 0;  ///< as PageEntry's
 };
 
+/// Appends a page or, where some of its octants alone are drawn (bits), each of these.
+void appendDrawn(std::vector<HostPage>& pages, HostPage page, uint32_t octants);
+
 /// An immutable tree down to the pages of a cut. Any thread may read it.
 ///
 /// Places inside are whole subcells: eighths of a finest cell, which no leaf is smaller than.
@@ -44,9 +47,10 @@ class HostScene {
 public:
     /// Errors: Usage where a page lies outside of the grid, or in another page.
     static Result<HostScene> create(const HostGrid& grid, std::span<const HostPage> cut);
-    /// `cut`: pages that `cache` has loaded; it must outlive the scene. Errors: Usage as above, or where one is not
-    /// loaded.
-    static Result<HostScene> create(const PageCache& cache, std::span<const uint64_t> cut);
+    /// `cut`: pages that `cache` has loaded; it must outlive the scene. `octants`: of each of them, those that alone
+    /// are drawn (bits; 0: all); empty: all pages are whole. Errors: Usage as above, or where one is not loaded.
+    static Result<HostScene> create(const PageCache& cache, std::span<const uint64_t> cut,
+                                    std::span<const uint8_t> octants = {});
 
     struct Page {
         const PageView* view;

@@ -16,8 +16,7 @@ public:
     HostDrawer(PageCache& cache, unsigned threads) : cache_(cache), options_{.threads = threads} {}
 
     Result<void> prepare(const FrameTask& task) override {
-        VCP_TRY_ASSIGN(const auto cut, loadDrawnCut(cache_, task.request));
-        VCP_TRY_ASSIGN(scene_, HostScene::create(cache_, cut));
+        VCP_TRY_ASSIGN(scene_, loadDrawnScene(cache_, task.request));
         return {};
     }
 

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -40,7 +41,8 @@ public:
         request.height = uint32_t(size.y);
         request.errorPixels = errorPixels_;
         request.colourError = kMostColourError;
-        VCP_TRY_ASSIGN(const auto scene, sceneFor(request));
+        VCP_TRY_ASSIGN(const HostScene scene, loadDrawnScene(cache_, request));
+        bytes_ = bytesOf(scene);
         const PictureRays rays = pictureRays(request);
         const auto frame = frameConstants(request, &cache_.dataset(), 1, false, errorPixels_);
         std::vector<HostPixel> pixels(size_t(size.x) * size.y);
@@ -71,11 +73,13 @@ public:
     }
 
 private:
-    Result<HostScene> sceneFor(const FrameRequest& request) {
-        VCP_TRY_ASSIGN(const auto cut, loadDrawnCut(cache_, request));
-        bytes_ = 0;
-        for (const uint64_t page : cut) bytes_ += cache_.dataset().pages[page].pageBytes;
-        return HostScene::create(cache_, cut);
+    /// Returns the bytes of a scene's pages; the octants of one follow each other.
+    [[nodiscard]] uint64_t bytesOf(const HostScene& scene) const {
+        uint64_t bytes = 0, last = UINT64_MAX;
+        for (uint32_t i = 0; i < scene.pages(); ++i)
+            if (const uint64_t page = scene.page(i).number; std::exchange(last, page) != page)
+                bytes += cache_.dataset().pages[page].pageBytes;
+        return bytes;
     }
 
     static void take(const PictureRays& rays, const TileHits& hits, std::vector<HostPixel>& pixels) {

@@ -278,8 +278,8 @@ TEST_F(BenchRays, NothingLeaksWherePagesAndLevelsMeet) {
     BenchRaysOptions options;
     options.models = {folder_ / "steps.ply"};
     ASSERT_TRUE(writePly(plainBesideDetail(), options.models[0]));
-    options.methods = {"certified"};
-    options.cameras = {"lattice"};
+    options.methods = {"certified", "host"};
+    options.cameras = {"lattice", "grazing"};
     options.views = 13;
     options.size = {160, 100};
     options.repetitions = 1;
@@ -287,11 +287,12 @@ TEST_F(BenchRays, NothingLeaksWherePagesAndLevelsMeet) {
     options.out = folder_ / "report";
     const auto report = benchRays(options);
     ASSERT_TRUE(report) << report.error().line();
-    ASSERT_EQ(report->rows.size(), 1u);
+    ASSERT_EQ(report->rows.size(), 4u);
     for (const BenchRaysRow& row : report->rows) {
-        EXPECT_EQ(row.classes.judged, 13u * 160 * 100);
-        EXPECT_EQ(row.classes.holes, 0u) << row.camera;
-        EXPECT_EQ(row.classes.beyondCertified, 0u) << row.camera << ", " << row.classes.maxOverCertified;
+        const std::string of = row.method + " " + row.camera;
+        EXPECT_EQ(row.classes.judged, 13u * 160 * 100) << of;
+        EXPECT_EQ(row.classes.holes, 0u) << of;
+        EXPECT_EQ(row.classes.beyondCertified, 0u) << of << ", " << row.classes.maxOverCertified;
     }
 }
 
