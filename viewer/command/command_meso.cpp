@@ -298,7 +298,10 @@ RunCommand addMesoBuild(CLI::App& meso) {
     app->add_option("-o,--output", command->out, "The asset to write")
         ->type_name("OUT.meso")
         ->required()
-        ->check([](const std::string& name) { return extensionProblem(name, ".meso", false); });
+        ->check([](const std::string& name) {
+            // Scenes know an asset by its ending.
+            return name.ends_with(".meso") ? std::string() : fmt::format("must end in .meso, not \"{}\"", name);
+        });
     addOverwriteOption(*app, command->overwrite);
     app->add_option("--height", command->height,
                     "Height of a PNG's white, of an EXR's greatest value over its least, in tile edges [0.1, or the "

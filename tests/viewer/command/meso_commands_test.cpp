@@ -305,6 +305,10 @@ TEST_F(MesoCommands, SaysWhatIsWrong) {
         EXPECT_EQ(ran.errLines(), 1u) << ran.err;
         EXPECT_FALSE(std::filesystem::exists(path("x.meso"))) << c.arguments;
     }
+    const Ran unnamed = run("meso build ball --grid 8 -o " + path("x"));
+    EXPECT_EQ(unnamed.status, 2);
+    EXPECT_NE(unnamed.err.find("must end in .meso"), std::string::npos) << unnamed.err;
+    EXPECT_FALSE(std::filesystem::exists(path("x")));
     EXPECT_EQ(run("meso info " + path("text.png")).status, 1);
     EXPECT_EQ(run("meso").status, 2);
 }
