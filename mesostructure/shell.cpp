@@ -23,6 +23,8 @@ constexpr double kLeastVolume = 0.02;            // of a piece, of that over a f
 constexpr double kLeastReach = 1.0 / 64;         // of a column, of the shell's height
 constexpr int kMostRounds = 16;                  // in which columns are cut, each round for what the last one changed
 
+constexpr double kLeastSmooth = 0.866;  // cosine of 30 degrees: where the base turns by more, it has an edge
+
 using Piece = ShellPiece;
 
 dvec3 faceNormal(const BaseSurface& surface, size_t triangle) {
@@ -283,6 +285,24 @@ void append(const Piece& piece, dvec3 extent, std::vector<glm::vec4>& texels) {
     for (int row = 0; row < 3; ++row) texels.push_back(glm::vec4(t[row], float(piece.columns[row])));
 }
 
+/// Appends the direction of each position, by which normals turn between the corners of the base.
+void appendDirections(const BaseSurface& surface, std::vector<glm::vec4>& texels) {
+    std::vector<dvec3> directions = shellDirections(surface);
+    std::vector<bool> isSharp(directions.size());
+    for (size_t i = 0; i < directions.size(); ++i) {
+        isSharp[i] = directions[i] == dvec3(0);
+        if (!isSharp[i]) directions[i] = glm::normalize(directions[i]);
+    }
+    for (size_t i = 0; i < surface.triangles.size(); ++i) {
+        const dvec3 normal = faceNormal(surface, i);
+        if (normal == dvec3(0)) continue;
+        for (const uint32_t corner : surface.triangles[i])
+            if (glm::dot(directions[corner], normal) < kLeastSmooth) isSharp[corner] = true;
+    }
+    for (size_t i = 0; i < directions.size(); ++i)
+        texels.push_back(isSharp[i] ? glm::vec4(0) : glm::vec4(directions[i], 1));
+}
+
 bool isFinite(const BaseSurface& surface) {
     const auto good = [](double x) { return std::isfinite(x); };
     for (const dvec3 p : surface.positions)
@@ -356,6 +376,7 @@ Result<Shell> buildShell(const BaseSurface& surface, double height, dvec3 extent
     shell.pieces = uint32_t(pieces.size());
     shell.low = shell.origin + dvec3(shell.texels[0]), shell.high = shell.origin + dvec3(shell.texels[1]);
     for (const uint32_t i : order) append(pieces[i], extent, shell.texels);
+    appendDirections(surface, shell.texels);
     for (const glm::vec4& texel : shell.texels)
         if (!std::isfinite(texel.x + texel.y + texel.z + texel.w))
             return fail(ErrorCode::InvalidInput,

@@ -40,13 +40,14 @@ struct Shell {
     uint64_t cut = 0;                                        ///< columns
     uint64_t inverted = 0, flat = 0;                         ///< pieces
 
-    /// `nodes` nodes, then `pieces` tetrahedra, as shaders read them:
+    /// `nodes` nodes, then `pieces` tetrahedra, then a direction for each position, as shaders read them:
     ///   node    (low, first child or first piece) (high, pieces; 0: two children, one after the other)
     ///   piece   (v0, bits: 1 << i where the face opposite corner i is cut, kBase where the one opposite the last is
     ///   the base, and its part, f32::kShellPart)
     ///           3 x (row of R, coordinate of q0)    weights of corners 1 to 3 are R (p - v0)
     ///           3 x (row of T, position's number)   tile space is q0 + T (p - v0); q0 is in the first tile; the
     ///           positions of its prism's columns
+    ///   direction   (unit normal of the base, 1), or 0 where the base turns sharply there
     /// A face is cut where it is on a border of the base, where the map jumps, or where it is the top over a column
     /// that was cut: solid shows its cut there.
     static constexpr uint32_t kBase = f32::kShellBaseFace;

@@ -55,6 +55,7 @@ MesoLook mesoLook(const MesoSurface& surface) {
 frame::MesoView plainView(const MesoSurface& surface) {
     frame::MesoView view{};
     view.nodes = surface.shell.nodes;
+    view.pieces = surface.shell.pieces;
     view.withBase = surface.withBase ? 1 : 0;
     view.shadowLift = float(surface.lift);
     view.colour = surface.colour;

@@ -5,8 +5,8 @@
 //   interpolation   of the eight corners' planes the nearest one's perpendicular, the trilinear vector, or the longer
 //                   of the two (2.2; their Fig. 4 b, a and c)
 //   march           step by the stored or interpolated distance; near the surface by that of the plane, if that is
-//                   more, up to twice epsilon (4.2); hit where the distance falls below epsilon, moved back to where it
-//                   is epsilon between the last two samples (2.1)
+//                   more, up to twice epsilon, or up to that beyond it (4.2); hit where the distance falls below
+//                   epsilon, moved back to where it is epsilon between the last two samples (2.1)
 //   memory traffic  the parent of the last node and the vectors of the last leaf are remembered (4.2)
 //
 // Each rule can be switched, so that its effect can be measured (PaperOptions). Where the paper is silent: epsilon, the
@@ -135,7 +135,7 @@ GridHit PaperCaster::cast(const GridRay& ray, Work& work) const {
         lastT = t;
         lastDistance = at.distance;
         t += at.isLeaf ? paper::marchStep(at.distance, glm::dot(at.vector, ray.direction), rules.epsilon,
-                                          rules.step == PaperStep::Planar)
+                                          uint32_t(rules.step))
                        : std::max(at.distance, rules.epsilon);
     }
     if (t <= ray.tMax) return {std::numeric_limits<float>::quiet_NaN(), {}};

@@ -50,6 +50,10 @@ cp "$images/../scenes/beads_dog.json" "$scratch"
 # Iterations of five methods on the same rays.
 draw heat '{"asset": "hemispheres", "tiles": 2}' --methods relief-binary,dm,ddm,ddm-quadric,boxes --shading steps --size 200x110 --camera 30,12,1.5
 
+# Beads of 3.2 cells at grid 16: fitted quadrics, quadrics through crossings, exact cells.
+draw quadrics '{"asset": "beads", "tiles": 1, "grid": 16, "far": false, '"$clay}" \
+    --methods ddm-quadric-fitted,ddm-quadric,boxes --size 240x180 --camera 30,35,1.6
+
 # Two refinements after five steps: binary search, secant; and what is there.
 draw two_refinements '{"asset": "hemispheres", "tiles": 2, "steps": 5, "refinements": 2, "far": false, '"$clay}" \
     --methods relief-binary,relief-secant,pyramid --size 240x180 --camera 30,25,2

@@ -37,7 +37,8 @@ using uint = uint32_t;
 #undef INLINE
 
 enum class PaperScheme : uint8_t { Trilinear, MinPlane, Longer };
-enum class PaperStep : uint8_t { Distance, Planar };
+/// Planar: by the plane, if that is more, up to twice epsilon. Onward: up to twice epsilon beyond the distance.
+enum class PaperStep : uint8_t { Distance, Planar, Onward };
 /// Octahedral: 13 bits of length as in Spherical, and 10 + 9 of direction; for comparison.
 enum class PaperPacking : uint8_t { Spherical, Octahedral };
 

@@ -1,9 +1,11 @@
 // The march of Demir and Westermann 2015: vectors inside a leaf, step sizes, the hit. Compiles as GLSL and as C++
 // in
 
-// These values are those of PaperScheme and PaperPacking.
+// These values are those of PaperScheme, PaperStep and PaperPacking.
 const uint kPaperTrilinear = 0u;
 const uint kPaperMinPlane = 1u;
+const uint kPaperByPlane = 1u;
+const uint kPaperOnward = 2u;
 const uint kPaperSpherical = 0u;
 
 const uint kPaperHeaderBytes = 64u;
@@ -79,10 +81,11 @@ INLINE vec3 interpolateVectors(CONST_REF(LeafVectors) corners, float size, vec3 
 }
 
 // How far to step where the vector has length d and v . direction is `approach`: d, or, by a plane, up to twice epsilon
-// (4.2). A ray never meets a plane that it does not approach.
-INLINE float marchStep(float d, float approach, float epsilon, bool byPlane) {
+// (4.2), or, by another reading, up to twice epsilon beyond d. A ray never meets a plane that it does not approach.
+INLINE float marchStep(float d, float approach, float epsilon, uint step) {
     float planar = approach > 0.0f ? d * d / approach : kPaperFar;
-    return byPlane ? max(d, min(planar, 2.0f * epsilon)) : d;
+    if (step == kPaperOnward) return max(d, min(planar, d + 2.0f * epsilon));
+    return step == kPaperByPlane ? max(d, min(planar, 2.0f * epsilon)) : d;
 }
 
 // The part of the last step after which the distance is epsilon (2.1); 1 where the distance before was not larger.

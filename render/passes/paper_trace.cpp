@@ -9,8 +9,8 @@ PaperTracePass::PaperTracePass() : pipelines_(kPaperTraceSpirv) {}
 Result<void> PaperTracePass::prepare(FrameResources& resources, const PassConstants& constants, bool sections,
                                      const PaperMarch& march) {
     return pipelines_.choose(resources, constants,
-                             {sections ? 1u : 0u, uint32_t(march.scheme), march.step == PaperStep::Planar ? 1u : 0u,
-                              march.back ? 1u : 0u, march.cached ? 1u : 0u});
+                             {sections ? 1u : 0u, uint32_t(march.scheme), uint32_t(march.step), march.back ? 1u : 0u,
+                              march.cached ? 1u : 0u});
 }
 
 void PaperTracePass::record(VkCommandBuffer commands, const FrameResources& resources) const {

@@ -158,7 +158,7 @@ PaperHit castPaper(Ray ray, PaperPage page, float from, float until, inout Work 
         isBack = isHit;
         lastT = isHit ? lastT : t;
         lastDistance = d;
-        float onward = isLeaf ? marchStep(d, dot(v, ray.direction), epsilon, kPlanar != 0u) : max(d, epsilon);
+        float onward = isLeaf ? marchStep(d, dot(v, ray.direction), epsilon, kStep) : max(d, epsilon);
         t += isHit ? 0.0 : onward;
         going = !ends && (isHit || (t <= tMax && steps < kPaperMostSteps));
         if (!ends && !going && t <= tMax) hit.depth = kGaveUp;

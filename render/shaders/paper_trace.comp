@@ -13,7 +13,7 @@
 
 layout(constant_id = 7) const uint kSections = 0u;  // 1: planes cut
 layout(constant_id = 8) const uint kScheme = 2u;    // PaperScheme
-layout(constant_id = 9) const uint kPlanar = 1u;    // PaperStep
+layout(constant_id = 9) const uint kStep = 1u;      // PaperStep
 layout(constant_id = 10) const uint kBack = 1u;     // PaperMarch::back
 layout(constant_id = 11) const uint kCached = 1u;   // PaperMarch::cached
 layout(local_size_x = 8, local_size_y = 8) in;

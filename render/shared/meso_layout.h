@@ -60,11 +60,11 @@ struct MesoView {
     float meanHeight;   // tile units
     uint farShadows;    // 1: what is seen from far has the shadows of the mesostructure on itself
     uint sectionCount;
-    float shadowLift;     // world units by which shadow rays start above a hit
-    uint hasEnvironment;  // 0 or 1
-    uint hasBaseLight;    // 1: the base changes the light of the surroundings (mesostructure/base_transfer.h)
-    uint unused;
-    vec4 lights[kMesoMaxLights];      // unit, towards each light; w: its strength
+    float shadowLift;             // world units by which shadow rays start above a hit
+    uint hasEnvironment;          // 0 or 1
+    uint hasBaseLight;            // 1: the base changes the light of the surroundings (mesostructure/base_transfer.h)
+    uint pieces;                  // of the shell
+    vec4 lights[kMesoMaxLights];  // unit, towards each light; w: its strength
     vec4 sections[kMesoMaxSections];  // as FrameConstants::sections, in world units from the shell's origin
     vec4 environment[9];              // as FrameConstants::environment, world axes
     MesoTransfer transfer;

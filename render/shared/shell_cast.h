@@ -146,6 +146,25 @@ INLINE float boxEntry(uint node, vec3 o, vec3 inverse, float leave, INOUT(vec4) 
     return first <= last ? first : kMesoNoHit;
 }
 
+// Turns the normal of a hit as the base turns between its corners: a piece's own up jumps from piece to piece. Columns
+// at sharp edges of the base have no direction and take the piece's.
+INLINE vec3 turnedWithBase(int piece, vec3 p, vec3 n) {
+    vec4 t0 = fetchInput(piece + 4), t1 = fetchInput(piece + 5), t2 = fetchInput(piece + 6);
+    vec3 own = normalize(vec3(t2)), weights = columnWeights(piece, p), columns = vec3(t0.w, t1.w, t2.w);
+    vec3 up = vec3(0.0f);
+    int first = int(kShellNodeTexels * view.nodes + kShellPieceTexels * view.pieces);
+    for (int k = 0; k < 3; k++) {
+        vec4 column = fetchInput(first + int(columns[k]));
+        up += weights[k] * (column.w > 0.0f ? vec3(column) : own);
+    }
+    up = normalize(up);
+    float same = dot(own, up);
+    if (!(same > 0.5f)) return n;
+    // The shortest turn from one to the other.
+    vec3 sum = own + up;
+    return n + 2.0f * dot(own, n) * up - dot(sum, n) / (1.0f + same) * sum;
+}
+
 INLINE ShellHit castShell(vec3 eye, vec3 d, float tMax) {
     ShellHit best;
     best.iterations = 0u;
@@ -196,6 +215,7 @@ INLINE ShellHit castShell(vec3 eye, vec3 d, float tMax) {
     }
     // This also covers devices that end a long loop by themselves, as software ones do.
     if (left > 0u || depth > 0) best.unresolved = true;
+    if (best.t < tMax && !best.cut) best.normal = turnedWithBase(best.piece, o + (best.t - start) * d, best.normal);
     return best;
 }
 

@@ -21,7 +21,8 @@ void checkShell(const vcp::meso::BaseSurface& base) {
     const auto shell = vcp::meso::buildShell(base, 0.1 * vcp::meso::tileEdge(base), {1, 1, 0.1});
     if (!shell) return require(shell.error().line().find('\n') == std::string::npos, "an error is one line");
     require(shell->pieces > 0 && shell->pieces <= 3 * base.triangles.size(), "three pieces a triangle at most");
-    require(shell->texels.size() == size_t{2} * shell->nodes + size_t{7} * shell->pieces, "nodes and pieces");
+    require(shell->texels.size() == size_t{2} * shell->nodes + size_t{7} * shell->pieces + base.positions.size(),
+            "nodes, pieces and directions");
     for (const glm::vec4& texel : shell->texels)
         require(std::isfinite(texel.x + texel.y + texel.z + texel.w), "a shell is finite");
 }

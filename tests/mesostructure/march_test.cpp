@@ -4,6 +4,7 @@
 #include <random>
 
 #include <glm/geometric.hpp>
+#include <glm/trigonometric.hpp>
 
 #include "tests/support/meso_rays.h"
 
@@ -111,6 +112,46 @@ TEST(March, SampledSolidsAreAsLargeAsTheirShapes) {
     // In cells; it is 0.02 without the correction.
     EXPECT_LT(std::abs(behind / hits) * 32, 0.005);
     EXPECT_LE(missed, 2 * falseHits + 4);
+}
+
+/// Returns the angle between unit vectors, in degrees.
+double degreesBetween(glm::dvec3 a, glm::dvec3 b) {
+    return glm::degrees(2 * std::asin(std::min(0.5 * glm::distance(a, b), 1.0)));
+}
+
+/// A trilinear function's gradient jumps by 2 to 4 degrees from cell to cell: a ball has facets.
+TEST(March, NormalsOfSampledSolidsDoNotJumpBetweenCells) {
+    for (const std::string name : {"ball", "beads"}) {
+        const auto shape = test::solid(name);
+        const glm::ivec3 cells(64, 64, int(std::ceil(64 * shape->extent().z)));
+        const SampledField field = *sampleField(*shape, cells);
+        Occupancy occupancy = test::occupied(*shape, cells);
+        occupyField(field, occupancy);
+        const auto marcher = test::walk({.occupancy = &occupancy}, {.field = &field});
+        std::mt19937 random(11);
+        int pairs = 0, wrong = 0;
+        double jump = 0;  // beyond that of the shape, degrees
+        for (int i = 0; i < 60000; ++i) {
+            MarchRay ray = test::rayFromTop(random, shape->extent(), 30);
+            const MarchResult a = marcher->march(ray);
+            const TruthHit trueA = shape->trace(ray.origin, ray.direction, ray.tMax);
+            ray.origin.x += 0.02 / 64;
+            const MarchResult b = marcher->march(ray);
+            const TruthHit trueB = shape->trace(ray.origin, ray.direction, ray.tMax);
+            if (a.state != MarchState::Hit || b.state != MarchState::Hit || !trueA.hit || !trueB.hit) continue;
+            const double turn = degreesBetween(trueA.normal, trueB.normal);
+            if (turn > 1) continue;
+            ++pairs;
+            wrong += degreesBetween(glm::dvec3(a.normal), trueA.normal) > 1;
+            jump = std::max(jump, degreesBetween(glm::dvec3(a.normal), glm::dvec3(b.normal)) - turn);
+        }
+        EXPECT_GT(pairs, 500) << name;
+        // Beads have an edge where they stand on the floor: normals are blended over it.
+        EXPECT_LT(wrong, (name == "ball" ? 0.02 : 0.08) * pairs) << name;
+        if (name == "ball") {
+            EXPECT_LT(jump, 0.5);
+        }
+    }
 }
 
 TEST(March, PatchesFollowTheShape) {

@@ -61,8 +61,8 @@ TEST(Shell, BasesFaceOutwardsAndHaveSoundShells) {
         for (const glm::dvec3 p : surface.positions) low = glm::min(low, p), high = glm::max(high, p);
         EXPECT_NEAR(shell.high.z, high.z + 0.05, name == "tree" || name == "vase" ? 0.07 : 0.01) << name;
         EXPECT_LT(shell.low.x, name == "quad" ? low.x + 1e-3 : low.x - 0.03) << name;
-        EXPECT_EQ(shell.texels.size(),
-                  Shell::kNodeTexels * size_t{shell.nodes} + Shell::kPieceTexels * size_t{shell.pieces})
+        EXPECT_EQ(shell.texels.size(), Shell::kNodeTexels * size_t{shell.nodes} +
+                                           Shell::kPieceTexels * size_t{shell.pieces} + surface.positions.size())
             << name;
     }
 }

@@ -135,7 +135,7 @@ TEST(FrameLayout, Mesostructure) {
                                              AT(MesoView, strayPixels),  AT(MesoView, meanHeight),
                                              AT(MesoView, farShadows),   AT(MesoView, sectionCount),
                                              AT(MesoView, shadowLift),   AT(MesoView, hasEnvironment),
-                                             AT(MesoView, hasBaseLight), AT(MesoView, unused),
+                                             AT(MesoView, hasBaseLight), AT(MesoView, pieces),
                                              AT(MesoView, lights),       AT(MesoView, sections),
                                              AT(MesoView, environment),  AT(MesoView, transfer),
                                              AT(MesoView, harmonics)}));

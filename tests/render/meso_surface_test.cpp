@@ -4,6 +4,8 @@
 #include <numeric>
 
 #include <gtest/gtest.h>
+#include <glm/geometric.hpp>
+#include <glm/trigonometric.hpp>
 
 #include "tests/support/meso_surfaces.h"
 #include "tests/support/renderer_fixture.h"
@@ -118,6 +120,48 @@ TEST_F(MesoSurfaces, PlateauOnASphereIsASphereWithoutHoles) {
                 EXPECT_GT(glm::dot(glm::dvec3(normals[y * kEdge + x]), glm::normalize(hit)), 0.97) << x << ", " << y;
             }
     }
+}
+
+/// Pieces are flat between their corners, by 6 degrees here; normals are those of the ball that they stand for.
+TEST_F(MesoSurfaces, NormalsTurnAsASmoothBaseDoes) {
+    draw({mesoSurface(plateau(), "pyramid", "sphere", 0.2, 3)}, fromAbove());
+    const auto depths = *renderer_->readDepth();
+    const auto normals = *renderer_->readNormals();
+    const auto degrees = [](glm::dvec3 a, glm::dvec3 b) {
+        return glm::degrees(2 * std::asin(std::min(0.5 * glm::distance(glm::normalize(a), glm::normalize(b)), 1.0)));
+    };
+    double error = 0, jump = 0;
+    int pairs = 0;
+    for (uint32_t y = 0; y < kEdge; ++y)
+        for (uint32_t x = 0; x + 1 < kEdge; ++x) {
+            const size_t i = y * kEdge + x;
+            const glm::dvec3 a(placeOf(x, y), 5 - double(depths[i])), b(placeOf(x + 1, y), 5 - double(depths[i + 1]));
+            if (std::max(glm::length(glm::dvec2(a)), glm::length(glm::dvec2(b))) > 0.9) continue;
+            ++pairs;
+            const double turns = degrees(glm::dvec3(normals[i]), glm::dvec3(normals[i + 1]));
+            error = std::max(error, degrees(glm::dvec3(normals[i]), a));
+            jump = std::max(jump, turns - degrees(a, b));
+        }
+    EXPECT_GT(pairs, 2000);
+    EXPECT_LT(error, 0.7);
+    EXPECT_LT(jump, 0.7);
+}
+
+TEST_F(MesoSurfaces, SharpEdgesOfABaseStaySharp) {
+    FrameRequest request = fromAbove();
+    draw({mesoSurface(plateau(), "pyramid", "box", 0.2, 3)}, request);
+    const auto depths = *renderer_->readDepth();
+    const auto normals = *renderer_->readNormals();
+    int top = 0;
+    for (uint32_t y = 0; y < kEdge; ++y)
+        for (uint32_t x = 0; x < kEdge; ++x) {
+            const glm::dvec2 p = placeOf(x, y);
+            if (std::max(std::abs(p.x), std::abs(p.y)) > 0.95) continue;
+            ASSERT_TRUE(std::isfinite(depths[y * kEdge + x])) << x << ", " << y;
+            EXPECT_GT(normals[y * kEdge + x].z, 0.999f) << x << ", " << y;
+            ++top;
+        }
+    EXPECT_GT(top, 2000);
 }
 
 /// Many triangles in one place: what a ray may look at is bounded, and it is said that it was not all.

@@ -132,9 +132,10 @@ TEST_F(PaperTrace, EveryRuleIsTheCpus) {
         FrameRequest request = test::requestOf(scene.camera({-0.3, -0.5, -1}), kWidth, kHeight);
         expectSame(scene, request);
         if (options != plain) continue;
-        for (const PaperMarch march : {PaperMarch{.epsilon = 0.1f, .scheme = PaperScheme::Trilinear},
-                                       PaperMarch{.scheme = PaperScheme::MinPlane, .step = PaperStep::Distance},
-                                       PaperMarch{.back = false, .cached = false}}) {
+        for (const PaperMarch march :
+             {PaperMarch{.epsilon = 0.1f, .scheme = PaperScheme::Trilinear},
+              PaperMarch{.scheme = PaperScheme::MinPlane, .step = PaperStep::Distance},
+              PaperMarch{.step = PaperStep::Onward}, PaperMarch{.back = false, .cached = false}}) {
             request.march = march;
             expectSame(scene, request);
         }

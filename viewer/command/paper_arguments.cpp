@@ -77,8 +77,9 @@ void addPaperMarchOptions(CLI::App& app, PaperMarch& march) {
     const ScopedGroup paper(app, help_group::kPaper);
     addLength(app, "--paper-epsilon", march.epsilon, "A ray hits nearer than this");
     addPaperSchemeOption(app, march.scheme);
-    addChoice<PaperStep>(app, "--paper-step", march.step, "Steps near the surface",
-                         {{"planar", PaperStep::Planar}, {"distance", PaperStep::Distance}});
+    addChoice<PaperStep>(
+        app, "--paper-step", march.step, "Steps near the surface",
+        {{"planar", PaperStep::Planar}, {"onward", PaperStep::Onward}, {"distance", PaperStep::Distance}});
     addChoice<bool>(app, "--paper-back", march.back, "A hit is moved back to where the distance is epsilon",
                     {{"on", true}, {"off", false}});
     addChoice<bool>(app, "--paper-cache", march.cached, "A step reuses the node and vectors of the step before",

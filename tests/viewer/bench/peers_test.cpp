@@ -204,7 +204,10 @@ TEST_F(PeersOnASphere, MergingSavesBytesAndEveryRuleCanBeSwitched) {
     };
     const uint32_t planar = steps(*thin);
     thin->setMarch({.step = PaperStep::Distance});
-    EXPECT_GT(steps(*thin), planar);
+    const uint32_t distance = steps(*thin);
+    thin->setMarch({.step = PaperStep::Onward});
+    EXPECT_GT(distance, planar);
+    EXPECT_GT(planar, steps(*thin));
 }
 
 TEST(Peers, RegionGrowingIsNeverNearerAndFiveRoundsReachTheBand) {

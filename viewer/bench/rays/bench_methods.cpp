@@ -23,6 +23,7 @@ const std::vector<RayMethod> kMethods = {{"certified", 0.5, {0.5, 1, 2, 4}},
                                          {"host", 0.5, {0.5, 1, 2, 4}},
                                          {"reference"},
                                          {"paper", 0.25, {0.5, 0.25, 0.1}},
+                                         {"paper-onward", 0.25, {0.5, 0.25, 0.1}},
                                          {"paper-gpu", 0.25, {0.5, 0.25, 0.1}},
                                          {"paper-rules"},
                                          {"sdf", 1, {2, 1, 0.5}},
@@ -41,6 +42,7 @@ constexpr PaperRule kPaperRules[] = {
     {"as published", [](PaperOptions&) {}},
     {"scheme trilinear", [](PaperOptions& o) { o.march.scheme = PaperScheme::Trilinear; }},
     {"scheme min-plane", [](PaperOptions& o) { o.march.scheme = PaperScheme::MinPlane; }},
+    {"step onward", [](PaperOptions& o) { o.march.step = PaperStep::Onward; }},
     {"step distance", [](PaperOptions& o) { o.march.step = PaperStep::Distance; }},
     {"back off", [](PaperOptions& o) { o.march.back = false; }},
     {"cache off", [](PaperOptions& o) { o.march.cached = false; }},
@@ -101,6 +103,10 @@ Result<std::unique_ptr<RayTracer>> RayMethods::make(const std::string& method, d
     paper.march.epsilon = float(knob);
     if (method == "paper") return makePaper(paper, fmt::format("eps {:g}", knob));
     if (method == "paper-gpu") return makePaperGpu(paper);
+    if (method == "paper-onward") {
+        paper.march.step = PaperStep::Onward;
+        return makePaper(paper, fmt::format("eps {:g}", knob));
+    }
     if (method == "sdf" || method == "sdf-analytic") return makeDistances(method == "sdf-analytic", knob);
     if (method == "voxel" || method == "svo-contours") return makeVoxels(method == "svo-contours", knob);
     return makeEmbreeTracer(in_.mesh, method == "embree", in_.threads);

@@ -5,6 +5,7 @@
 //   host           the renderer's rays on the processor (render/host/)     error-pixels  0.5; swept 0.5, 1, 2, 4
 //   reference      the reference ray-caster in double, finest level
 //   paper          Demir and Westermann 2015 (builder/paper/paper_octree.h)        eps  0.25; swept 0.5, 0.25, 0.1
+//   paper-onward   the same, steps by the plane up to 2 eps beyond the distance   eps, as paper
 //   paper-gpu      the same march over the same octree on a Vulkan device   eps, as paper
 //   paper-rules    the same with one rule changed at a time                the rule; all of them, always
 //   sdf            signed-distance octree (viewer/bench/peers/distance_octree.h)        cell  1; swept 2, 1, 0.5

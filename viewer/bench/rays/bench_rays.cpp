@@ -88,7 +88,8 @@ private:
     }
 
     [[nodiscard]] std::vector<double> knobsOf(const std::string& method) const {
-        if ((method == "paper" || method == "paper-gpu") && !options_.sweep) return {options_.paper.march.epsilon};
+        if ((method == "paper" || method == "paper-onward" || method == "paper-gpu") && !options_.sweep)
+            return {options_.paper.march.epsilon};
         return rayMethodKnobs(method, options_.sweep);
     }
 

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "viewer/bench/rays/bench_rays.h"
+#include "viewer/bench/rays/levels_saved.h"
 #include "viewer/bench/rays/paper_tables.h"
 #include "viewer/bench/report/csv_text.h"
 #include "viewer/bench/report/plot_svg.h"
@@ -166,7 +167,7 @@ std::string benchRaysMarkdown(const BenchRaysReport& report) {
             row.work.cells.mean(), tail(row.work.cells), row.work.fetches.mean(), tail(row.work.fetches),
             double(row.bytes) * 1e-6);
     }
-    return text + besidePaperMarkdown(report) + stabilityMarkdown(report.stability);
+    return text + besidePaperMarkdown(report) + levelsSavedMarkdown(report) + stabilityMarkdown(report.stability);
 }
 
 std::vector<std::pair<std::string, std::string>> benchRaysPlots(const BenchRaysReport& report) {

@@ -16,6 +16,7 @@
 #include "viewer/bench/rays/bench_methods.h"
 #include "viewer/bench/rays/bench_rays.h"
 #include "viewer/bench/rays/bench_stability.h"
+#include "viewer/bench/rays/levels_saved.h"
 #include "viewer/bench/rays/paper_tables.h"
 
 namespace vcp {
@@ -350,6 +351,43 @@ TEST(PaperTables, RatiosToThePaper) {
     EXPECT_NE(text.find("| here: shape | 1.00 | 0.50 | 0.25 | |"), std::string::npos) << text;
     EXPECT_NE(text.find("| here: shape | 1.00 | 0.60 | 0.90 | |"), std::string::npos) << text;
     EXPECT_NE(text.find("| published: David | 1.00 | 1.00 | 0.98 | 0.79 |"), std::string::npos) << text;
+}
+
+TEST(LevelsSaved, AreInterpolatedInTheLogarithmOfTheCell) {
+    const PeerPoint voxels[] = {{0.25, 0.2}, {0.5, 0.4}, {1, 0.8}};
+    const auto inside = peerCellWith(voxels, 0.2 * std::sqrt(2.0));
+    ASSERT_TRUE(inside);
+    EXPECT_NEAR(inside->log2Cell, -1.5, 1e-12);
+    EXPECT_FALSE(inside->isExtrapolated);
+    for (const auto& [value, cell] : {std::pair(0.05, -4.0), std::pair(3.2, 2.0)}) {
+        const auto beyond = peerCellWith(voxels, value);
+        ASSERT_TRUE(beyond) << value;
+        EXPECT_NEAR(beyond->log2Cell, cell, 1e-12);
+        EXPECT_TRUE(beyond->isExtrapolated);
+    }
+    const PeerPoint normals[] = {{0.5, 30}, {1, 30.1}};
+    EXPECT_FALSE(peerCellWith(normals, 4));
+}
+
+TEST(LevelsSaved, AtEqualErrorAndAtEqualBytes) {
+    BenchRaysReport report;
+    const auto add = [&](const char* camera, const std::string& method, const std::string& knob, uint64_t bytes,
+                         double error) {
+        BenchRaysRow row;
+        row.model = "shape", row.camera = camera, row.method = method, row.knob = knob, row.bytes = bytes;
+        row.classes.distanceCells.p50 = row.classes.distanceCells.p95 = error;
+        report.rows.push_back(row);
+    };
+    add("whole", "paper", "eps 0.25", 4000000, 0.1);
+    add("close", "paper", "eps 0.25", 4000000, 0.3);
+    EXPECT_EQ(levelsSavedMarkdown(report), "");
+    add("whole", "voxel", "cell 1", 1000000, 0.8);
+    EXPECT_EQ(levelsSavedMarkdown(report), "") << "one cell is no curve";
+    add("whole", "voxel", "cell 0.5", 4000000, 0.4);
+    add("whole", "voxel", "cell 0.25", 16000000, 0.2);
+    const std::string text = levelsSavedMarkdown(report);
+    EXPECT_NE(text.find("| shape | eps 0.25 | p50, cells: 0.2 | | 2.0 | |"), std::string::npos) << text;
+    EXPECT_NE(text.find("| shape | eps 0.25 | 4.0 | | | 1.0 | 2 | | |"), std::string::npos) << text;
 }
 
 TEST(BenchCameras, RaysOfTheLatticeCameraRunThroughCorners) {
