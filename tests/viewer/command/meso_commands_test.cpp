@@ -109,6 +109,8 @@ TEST_F(MesoCommands, LargeMapsAreHeightsAlone) {
     EXPECT_GT(figures["remeshed_pixels"], 0);
     EXPECT_LE(figures["remeshed_pixels"], 0.5);
     EXPECT_GT(figures["surface_bytes"], 2 * 4104 * 4104);
+    EXPECT_NE(drawn.err.find("casts no shadows: rays are marched over at most 4096 texels"), std::string::npos)
+        << drawn.err;
     const Ran marched = draw(R"("boxes")");
     EXPECT_EQ(marched.status, 1);
     EXPECT_NE(marched.err.find("at most 4096"), std::string::npos) << marched.err;
