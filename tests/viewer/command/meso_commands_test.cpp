@@ -116,6 +116,15 @@ TEST_F(MesoCommands, LargeMapsAreHeightsAlone) {
     EXPECT_NE(marched.err.find("at most 4096"), std::string::npos) << marched.err;
 }
 
+TEST_F(MesoCommands, SequencesSayWhatIsCertified) {
+    std::ofstream(path("scene.json")) << R"({"mesostructure": [{"asset": "ridged", "method": "remesh"}]})";
+    const Ran drawn =
+        run("render " + path("scene.json") + " --size 64x48 --turntable 2 --samples 1 --json -o " + path("turn.png"));
+    ASSERT_EQ(drawn.status, 0) << drawn.err;
+    EXPECT_GT(Json::parse(drawn.out)["remeshed_pixels"], 0);
+    EXPECT_LE(Json::parse(drawn.out)["remeshed_pixels"], 0.5);
+}
+
 TEST_F(MesoCommands, MeshesMustBeClosed) {
     // A tetrahedron, and the same without a face.
     const std::string corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n", faces = "f 1 3 2\nf 1 2 4\nf 2 3 4\n";
