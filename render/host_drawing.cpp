@@ -126,7 +126,7 @@ Result<std::vector<PreparedSurface>> prepareOnHost(std::span<const MesoSurface> 
     std::map<LookKey, Words> known;
     std::vector<PreparedSurface> prepared;
     for (const MesoSurface& surface : surfaces) {
-        if (!surface.arrays) return unsupported("remeshed surfaces");
+        if (!surface.arrays || surface.remeshed.surface) return unsupported("remeshed surfaces");
         MesoLook look = mesoLook(surface);
         Words& words = known[lookKey(surface)];
         if (!words) words = std::make_shared<const std::vector<uint64_t>>(std::move(look.looks));

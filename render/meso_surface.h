@@ -21,14 +21,16 @@ struct RemeshedSurface {
     meso::RemeshOptions options;
 };
 
-/// One asset on one base surface: marched, with arrays and a shell, or remeshed.
+/// One asset on one base surface: marched, with arrays and a shell, or remeshed. What is remeshed and has both as well
+/// is what rays of light march: without them it casts no shadows.
 struct MesoSurface {
     std::shared_ptr<const meso::MarchArrays> arrays;  ///< surfaces may share them
     meso::Shell shell;
-    RemeshedSurface remeshed;  ///< its surface is null where this one is marched; of the rest, colour and colours count
-    glm::vec3 colour{0.8f};    ///< encoded, as the screen has it
-    bool withBase = true;      ///< the base is drawn where rays come through to it
-    double lift = 0;           ///< world units by which shadow rays start above a hit
+    RemeshedSurface
+        remeshed;            ///< its surface is null where this one is marched; neither far nor transfer count with it
+    glm::vec3 colour{0.8f};  ///< encoded, as the screen has it
+    bool withBase = true;    ///< the base is drawn where rays come through to it
+    double lift = 0;         ///< world units by which shadow rays start above a hit
     /// A texture over the tile, at the hit's place in it, may be shared; its colours are linear and replace `colour`.
     std::shared_ptr<const MesoTexture> colours;
     /// A texture of unit vectors that bend the mesostructure's shading normals: x and y are along the tile, z points

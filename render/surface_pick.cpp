@@ -48,7 +48,7 @@ std::optional<SurfacePoint> pickOnSurfaces(std::span<const MesoSurface> surfaces
     hit.depth = std::numeric_limits<float>::infinity();
     for (size_t i = 0; i < surfaces.size(); ++i) {
         const MesoSurface& surface = surfaces[i];
-        if (!surface.arrays) continue;
+        if (surface.remeshed.surface) continue;
         HostSurface cast{*surface.arrays, surface.shell, plainView(surface), {}, 0, false, {}};
         setRays(cast.view, surface.shell.origin + (i < moved.size() ? moved[i] : glm::dvec3(0)), rays);
         uint32_t iterations = 0;

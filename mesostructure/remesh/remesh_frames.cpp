@@ -1,5 +1,6 @@
 #include "mesostructure/remesh/remesh_frames.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include <glm/geometric.hpp>
@@ -18,7 +19,10 @@ RemeshFrame remeshFrame(const RemeshSurface& surface, size_t triangle) {
     const glm::dvec3 flat = glm::cross(p[1] - p[0], p[2] - p[0]);
     const double length = glm::length(flat);
     frame.facet = length > 0 ? flat / length : glm::normalize(d[0]);
-    frame.direction = d[0], frame.at = uv[0];
+    std::array<size_t, 3> order{0, 1, 2};
+    std::ranges::sort(order, {}, [&](size_t k) { return surface.triangles[triangle][k]; });
+    frame.place = p[order[0]], frame.direction = d[order[0]], frame.at = uv[order[0]];
+    frame.toSecond = uv[order[1]] - frame.at, frame.toLast = uv[order[2]] - frame.at;
     const glm::dvec2 a = uv[1] - uv[0], b = uv[2] - uv[0];
     const double area = a.x * b.y - a.y * b.x;
     if (!(std::abs(area) > 1e-12 * (glm::dot(a, a) + glm::dot(b, b)))) return frame;
@@ -33,15 +37,16 @@ RemeshFrame remeshFrame(const RemeshSurface& surface, size_t triangle) {
     return frame;
 }
 
-std::vector<glm::vec4> remeshFrames(const RemeshSurface& surface) {
+std::vector<glm::vec4> remeshFrames(const RemeshSurface& surface, glm::dvec3 origin) {
     std::vector<glm::vec4> quads{glm::vec4(float(surface.heights->levels().size()), 0, 0, 0)};
     quads.reserve(1 + RemeshMath<float>::kRemeshFrameQuads * surface.triangles.size());
     for (size_t i = 0; i < surface.triangles.size(); ++i) {
         const RemeshFrame frame = remeshFrame(surface, i);
         const auto add = [&](const glm::dvec3& v, double w) { quads.emplace_back(glm::vec3(v), float(w)); };
         add(frame.byU, frame.at.x), add(frame.byV, frame.at.y);
-        add(frame.directionByU, frame.turned), add(frame.directionByV, 0);
-        add(frame.direction, 0), add(frame.facet, 0);
+        add(frame.directionByU, frame.turned), add(frame.directionByV, frame.toSecond.x);
+        add(frame.direction, frame.toSecond.y), add(frame.facet, frame.toLast.x);
+        add(frame.place + (surface.origin - origin), frame.toLast.y);
     }
     return quads;
 }

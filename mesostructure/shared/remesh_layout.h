@@ -19,4 +19,6 @@ CONSTANT uint kRemeshPieceQuads = 14u;
 //  0, 1     derivatives by u and by v of places; the coordinates u and v of the first corner
 //  2, 3     of directions; 2: turned
 //  4, 5     direction of the first corner; the triangle's own normal
-CONSTANT uint kRemeshFrameQuads = 6u;
+//  6        place of the first corner
+//  3 to 6   behind these, a number each: where the other two corners are from the first, over the map
+CONSTANT uint kRemeshFrameQuads = 7u;

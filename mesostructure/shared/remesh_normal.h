@@ -1,14 +1,16 @@
-// The normal of a displaced surface at a place of its map, for a footprint on it, in C++ (mesostructure/remesh/
-// remesh_math.h) and GLSL (render/shaders/remesh_merge.comp): what a pixel of a remeshed surface is shaded with,
-// however large the triangle is that it shows. After remesh_heights.h.
+// A displaced surface at a place of its map, in C++ (mesostructure/remesh/remesh_math.h) and GLSL (render/shaders/
+// remesh_merge.comp): the normal, for a footprint, that a pixel of a remeshed surface is shaded with, and the point
+// from which rays of light start there, however large the triangle is that the pixel shows. After remesh_heights.h.
 
-// What a base triangle's places and directions are over the map.
+// What a base triangle's places and directions are over the map. The first corner is that of the lowest number, the
+// last that of the highest.
 struct RemeshFrame {
     Real3 byU, byV, directionByU, directionByV;  // derivatives by the texture coordinates
-    Real3 direction;                             // at `at`, which is a corner
+    Real3 place, direction;                      // of the first corner, which is at `at`
     Real2 at;
-    Real3 facet;  // the triangle's own normal
-    Real turned;  // sign of a product of derivatives that points outwards; 0 where the map has no area
+    Real2 toSecond, toLast;  // from there to the other corners
+    Real3 facet;             // the triangle's own normal
+    Real turned;             // sign of a product of derivatives that points outwards; 0 where the map has no area
 };
 
 // Returns the unit normal at a place in tile units. `texels`: the edge of the footprint, in texels.
@@ -28,4 +30,18 @@ INLINE Real3 remeshNormal(CONST_REF(RemeshFrame) frame, Real texels, Real2 at) {
     Real3 normal = cross(u, v);
     Real square = dot(normal, normal);
     return square > Real(0) ? normal * (frame.turned / sqrt(square)) : frame.facet;
+}
+
+// Returns the point of the surface at a place in tile units, as rays that march the map meet it: a shell is linear in
+// each of a prism's three pieces (mesostructure/shell.h), where what is remeshed is linear along each direction. At a
+// height of the map, the pieces have the last corner's column first, then the second's, then the first's.
+INLINE Real3 remeshShellPoint(CONST_REF(RemeshFrame) frame, Real2 at) {
+    Real2 off = at - frame.at, b = frame.toSecond, c = frame.toLast;
+    Real area = b.x * c.y - b.y * c.x, height = remeshLevelHeight(remeshLevel(0), at);
+    Real second = (off.x * c.y - off.y * c.x) / area, last = (b.x * off.y - b.y * off.x) / area;
+    Real ofLast = min(height, max(last, Real(0)));
+    Real ofSecond = min(height - ofLast, max(second, Real(0)));
+    Real2 turn = ofSecond * b + ofLast * c;
+    return frame.place + off.x * frame.byU + off.y * frame.byV + height * frame.direction +
+           turn.x * frame.directionByU + turn.y * frame.directionByV;
 }

@@ -43,6 +43,7 @@ Result<void> MesoSurfacePass::setSurfaces(std::span<const MesoSurface> surfaces)
     for (const MesoSurface& surface : surfaces) {
         Placed made;
         made.remeshed = surface.remeshed;
+        made.origin = surface.arrays ? surface.shell.origin : made.remeshed.surface->origin;
         if (made.remeshed.surface) {
             made.number = remeshed_++;
             const meso::HeightLevels& heights = *made.remeshed.surface->heights;
@@ -55,7 +56,7 @@ Result<void> MesoSurfacePass::setSurfaces(std::span<const MesoSurface> surfaces)
             // A pixel has the number in single precision.
             if (made.remeshed.surface->triangles.size() >= (size_t{1} << 24))
                 return Error{.code = ErrorCode::Limit, .message = "a remeshed base has less than 2^24 triangles"};
-            VCP_TRY_ASSIGN(made.frames, resources_.vectors(meso::remeshFrames(*made.remeshed.surface)));
+            VCP_TRY_ASSIGN(made.frames, resources_.vectors(meso::remeshFrames(*made.remeshed.surface, made.origin)));
         }
         made.arrays = surface.arrays;
         if (surface.arrays) {
@@ -76,11 +77,10 @@ Result<void> MesoSurfacePass::setSurfaces(std::span<const MesoSurface> surfaces)
             look = std::make_shared<MesoTexels>(std::move(uploadedLook));
         }
         made.look = look;
-        if (!made.remeshed.surface) {
+        if (made.arrays) {
             VCP_TRY_ASSIGN(auto shell, resources_.vectors(surface.shell.texels));
             made.shell = std::move(shell);
         }
-        made.origin = surface.shell.origin;
         placed.push_back(std::move(made));
     }
     surfaces_ = std::move(placed);
@@ -93,7 +93,7 @@ uint64_t MesoSurfacePass::assetBytes() const {
     for (const Placed& surface : surfaces_) {
         if (surface.remeshed.surface)
             bytes[surface.levels.get()] = surface.levels->buffer.bytes(), sum += surface.frames.buffer.bytes();
-        else
+        if (surface.arrays)
             bytes[surface.words.get()] = surface.words->buffer.bytes(), sum += surface.shell.buffer.bytes();
         if (surface.look) bytes[surface.look.get()] = surface.look->buffer.bytes();
     }
@@ -101,7 +101,7 @@ uint64_t MesoSurfacePass::assetBytes() const {
     return sum;
 }
 
-Result<void> MesoSurfacePass::makeTarget(MesoTarget& target, PictureSize size, uint32_t planes,
+Result<void> MesoSurfacePass::makeTarget(MesoTarget& target, PictureSize size, uint32_t planes, bool keepsTransfer,
                                          const Picture& picture) {
     // The target has no size until all of it is made.
     target = {};
@@ -117,7 +117,7 @@ Result<void> MesoSurfacePass::makeTarget(MesoTarget& target, PictureSize size, u
         MesoTarget::Drawing drawing;
         VCP_TRY_ASSIGN(drawing.constants, device_.createBuffer(sizeof(MesoConstants), kConstantsUse, MemoryUse::Local));
         MesoTarget::Drawing::BaseLight& light = drawing.baseLight;
-        const bool hasLight = surface.baseTransfer && planes > frame::kMesoPlanes;
+        const bool hasLight = surface.baseTransfer && keepsTransfer;
         if (hasLight) {
             VCP_TRY_ASSIGN(light.texels,
                            resources_.emptyHalfs(meso::BaseTransfer::kTexels * surface.baseTransfer->vertices()));
@@ -132,9 +132,16 @@ Result<void> MesoSurfacePass::makeTarget(MesoTarget& target, PictureSize size, u
                                 isRemeshed ? &surface.frames
                                 : hasLight ? &light.texels
                                            : nullptr}));
+        if (isRemeshed && surface.arrays) {
+            VCP_TRY_ASSIGN(drawing.lightSet,
+                           resources_.makeSet({&drawing.constants, surface.words.get(), &surface.shell, &target.hits,
+                                               picture.colours, &target.counters, nullptr, picture.sceneLight,
+                                               picture.depths, nullptr}));
+        }
         target.drawings.push_back(std::move(drawing));
     }
-    target.size = size, target.planes = planes, target.surfaces = version_, target.picture = picture.colours->handle();
+    target.size = size, target.planes = planes, target.keepsTransfer = keepsTransfer, target.surfaces = version_,
+    target.picture = picture.colours->handle();
     target.sceneLight = handleOf(picture.sceneLight), target.depths = picture.depths->handle();
     return {};
 }
@@ -147,15 +154,21 @@ Result<void> MesoSurfacePass::choosePipelines(const Placed& surface, MesoTarget:
         std::vector<uint32_t> constants = march;
         constants.insert(constants.end(), {rays, textures, surface.isFarDrawn ? 1u : 0u, inScene ? 1u : 0u});
         // Without the plane the pipelines are those of pictures without transfer.
-        if (rays == kPictureRays && keepsTransfer(shading))
+        const bool withTransfer = rays == kPictureRays && keepsTransfer(shading);
+        if (withTransfer)
             constants.push_back(surface.hasTransfer ? frame::kMesoTransferRead : frame::kMesoTransferKept);
+        if (const uint32_t starts = startPlanes(shading, inScene); starts > 0) {
+            if (!withTransfer) constants.push_back(0);
+            constants.push_back(starts);
+        }
         return resources_.pipeline(spirv, constants);
     };
     if (surface.remeshed.surface) {
         VCP_TRY_ASSIGN(drawing.cast, choose(kRemeshMergeSpirv, kPictureRays, surface.textures));
-        return {};
+    } else {
+        VCP_TRY_ASSIGN(drawing.cast, choose(kMesoSurfaceSpirv, kPictureRays, surface.textures));
     }
-    VCP_TRY_ASSIGN(drawing.cast, choose(kMesoSurfaceSpirv, kPictureRays, surface.textures));
+    if (!surface.arrays) return {};
     // Rays of light read no textures.
     if (hasMesoShadows(shading)) {
         VkPipeline& lights = inScene ? drawing.sun : drawing.shadow;
@@ -169,12 +182,13 @@ Result<void> MesoSurfacePass::choosePipelines(const Placed& surface, MesoTarget:
 
 Result<void> MesoSurfacePass::prepare(MesoTarget& target, const Picture& picture, const FrameRequest& request) {
     const PictureSize size = sizeOf(request);
-    const uint32_t planes = frame::kMesoPlanes + (keepsTransfer(request.shading) ? 1 : 0);
-    if (!(size == target.size) || planes != target.planes || target.surfaces != version_ ||
-        target.picture != picture.colours->handle() || target.sceneLight != handleOf(picture.sceneLight) ||
-        target.depths != picture.depths->handle())
-        VCP_TRY(makeTarget(target, size, planes, picture));
-    const bool inScene = picture.sceneLight != nullptr;
+    const bool inScene = picture.sceneLight != nullptr, withTransfer = keepsTransfer(request.shading);
+    const uint32_t starts = startPlanes(request.shading, inScene);
+    const uint32_t planes = starts > 0 ? starts + frame::kMesoStartPlanes : frame::kMesoPlanes + (withTransfer ? 1 : 0);
+    if (!(size == target.size) || planes != target.planes || withTransfer != target.keepsTransfer ||
+        target.surfaces != version_ || target.picture != picture.colours->handle() ||
+        target.sceneLight != handleOf(picture.sceneLight) || target.depths != picture.depths->handle())
+        VCP_TRY(makeTarget(target, size, planes, withTransfer, picture));
     target.remeshed.certifiedPixels = 0, target.remeshed.uncertified = 0;
     for (size_t i = 0; i < surfaces_.size(); ++i) {
         const Placed& surface = surfaces_[i];
@@ -185,7 +199,7 @@ Result<void> MesoSurfacePass::prepare(MesoTarget& target, const Picture& picture
                                    remeshLook(request)));
     }
     std::vector<uint32_t> shade{0, 0, 0, 0, 0, 0, 0, inScene ? 1u : 0u};
-    if (planes > frame::kMesoPlanes) shade.push_back(frame::kMesoTransferKept);
+    if (withTransfer) shade.push_back(frame::kMesoTransferKept);
     VCP_TRY_ASSIGN(target.shade, resources_.pipeline(kMesoShadeSpirv, shade));
     return {};
 }
@@ -204,20 +218,29 @@ bool MesoSurfacePass::keepsTransfer(const Shading& shading) const {
     return readsTransfer(shading) && std::ranges::any_of(surfaces_, &Placed::hasTransfer);
 }
 
+uint32_t MesoSurfacePass::startPlanes(const Shading& shading, bool inScene) const {
+    const bool casts = hasMesoShadows(shading) || (inScene && shading.occlusionRays > 0);
+    const bool any = std::ranges::any_of(surfaces_, [](const Placed& each) { return each.arrays != nullptr; });
+    if (remeshed_ == 0 || !casts || !any) return 0;
+    return frame::kMesoPlanes + (keepsTransfer(shading) ? 1 : 0);
+}
+
 MesoConstants MesoSurfacePass::constantsOf(size_t number, const FrameRequest& request) const {
     const Placed& surface = surfaces_[number];
     MesoConstants c{surface.arrays ? surface.arrays->record : meso::f32::MesoRecord{}, surface.view};
     // Textures are repeated with the tile.
-    if (surface.remeshed.surface) c.record.extent = glm::vec3(1, surface.remeshed.surface->heights->rows(), 1);
+    if (!surface.arrays) c.record.extent = glm::vec3(1, surface.remeshed.surface->heights->rows(), 1);
     setPicture(c.view, surface.origin + movedBy(request, number), request);
     return c;
 }
 
-void MesoSurfacePass::dispatch(VkCommandBuffer commands, VkPipeline pipeline, const MesoTarget& target,
-                               size_t surface) const {
+void MesoSurfacePass::dispatch(VkCommandBuffer commands, VkPipeline pipeline, const MesoTarget& target, size_t surface,
+                               Rays rays) const {
+    const MesoTarget::Drawing& drawing = target.drawings[surface];
+    const bool ofLight = rays == Rays::OfLight && surfaces_[surface].remeshed.surface;
     vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipeline);
     vkCmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_COMPUTE, resources_.layout(), 0, 1,
-                            &target.drawings[surface].set.set, 0, nullptr);
+                            ofLight ? &drawing.lightSet.set : &drawing.set.set, 0, nullptr);
     vkCmdDispatch(commands, (target.size.width + 7) / 8, (target.size.height + 7) / 8, 1);
     barrierComputeToCompute(commands);
 }
@@ -257,16 +280,16 @@ void MesoSurfacePass::recordHits(VkCommandBuffer commands, MesoTarget& target, c
 }
 
 void MesoSurfacePass::recordRay(VkCommandBuffer commands, const MesoTarget& target, const frame::MesoLightRay& ray) {
-    std::vector<size_t> marched;
+    std::vector<size_t> casting;
     for (size_t i = 0; i < surfaces_.size(); ++i)
-        if (!surfaces_[i].remeshed.surface) marched.push_back(i);
+        if (surfaces_[i].arrays) casting.push_back(i);
     frame::MesoLightRay through = ray;
-    for (const size_t i : marched) {
-        through.isFirst = ray.isFirst != 0 && i == marched.front() ? 1 : 0;
-        through.isLast = ray.isLast != 0 && i == marched.back() ? 1 : 0;
+    for (const size_t i : casting) {
+        through.isFirst = ray.isFirst != 0 && i == casting.front() ? 1 : 0;
+        through.isLast = ray.isLast != 0 && i == casting.back() ? 1 : 0;
         push(commands, through);
         const bool isSun = ray.number > frame::kSunRay - frame::kMaxLights;
-        dispatch(commands, isSun ? target.drawings[i].sun : target.drawings[i].sky, target, i);
+        dispatch(commands, isSun ? target.drawings[i].sun : target.drawings[i].sky, target, i, Rays::OfLight);
     }
 }
 
@@ -275,7 +298,7 @@ void MesoSurfacePass::recordShade(VkCommandBuffer commands, const MesoTarget& ta
     const uint64_t plane = target.size.pixels() * 4;
     if (target.sceneLight == VK_NULL_HANDLE && hasMesoShadows(request.shading))
         for (size_t i = 0; i < surfaces_.size(); ++i)
-            if (!surfaces_[i].remeshed.surface) dispatch(commands, target.drawings[i].shadow, target, i);
+            if (surfaces_[i].arrays) dispatch(commands, target.drawings[i].shadow, target, i, Rays::OfLight);
     push(commands, {.occlusionRays = request.shading.occlusionRays});
     dispatch(commands, target.shade, target, 0);
     barrierComputeToReadback(commands);

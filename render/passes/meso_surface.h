@@ -1,8 +1,8 @@
 // Mesostructure on surfaces, over the picture that the datasets left (shaders/meso_surface.comp, meso_shade.comp): for
 // each surface a dispatch that finds first hits in its shell and keeps the nearest of all, or, where it is remeshed,
-// what RemeshRaster does; then one that casts shadow rays, then one that shades. Remeshed surfaces get the shadows of
-// the others and cast none. Normals are as the other passes pack them; depths are in world units, as those of the
-// compose pass, from which they start.
+// what RemeshRaster does; then one that casts shadow rays, then one that shades. Rays of light march remeshed surfaces,
+// too, where these have what it takes, and start from them where rays that march would meet them. Normals are as the
+// other passes pack them; depths are in world units, as those of the compose pass, from which they start.
 //
 // Where surfaces and datasets shade each other, the hits are found before any ray of light is cast (recordHits) and
 // stand in the whole picture's depths and planes of light (passes/scene_light.h); each ray goes through the surfaces
@@ -49,7 +49,7 @@ struct MesoTarget {
             std::optional<std::array<glm::vec4, 16>> of;  ///< the surroundings that it was filled for
             bool isCopied = false;                        ///< a recorded frame copies what was filled
         } baseLight;
-        MesoSet set;
+        MesoSet set, lightSet;  ///< lightSet: of rays of light through what is remeshed
         VkPipeline cast = VK_NULL_HANDLE, shadow = VK_NULL_HANDLE, sun = VK_NULL_HANDLE, sky = VK_NULL_HANDLE;
     };
     PictureSize size;       ///< 0: nothing is made
@@ -57,6 +57,7 @@ struct MesoTarget {
     Buffer hits, counters;
     Buffer reported;                       ///< MesoReport
     uint32_t planes = 0;                   ///< of the hits
+    bool keepsTransfer = false;            ///< one of them is of transfer
     VkBuffer picture = VK_NULL_HANDLE;     ///< not owned; in the sets
     VkBuffer sceneLight = VK_NULL_HANDLE;  ///< the same; null where surfaces and datasets do not shade each other
     VkBuffer depths = VK_NULL_HANDLE;      ///< the same
@@ -115,14 +116,19 @@ private:
     };
     /// Whether a picture has a plane of the light that comes through volumes of transfer.
     [[nodiscard]] bool keepsTransfer(const Shading& shading) const;
+    /// Returns the first plane of what rays of light start at; 0 where there is none.
+    [[nodiscard]] uint32_t startPlanes(const Shading& shading, bool inScene) const;
     static void fillBaseLight(const Placed& surface, MesoTarget::Drawing::BaseLight& light, const Shading& shading);
-    Result<void> makeTarget(MesoTarget& target, PictureSize size, uint32_t planes, const Picture& picture);
+    Result<void> makeTarget(MesoTarget& target, PictureSize size, uint32_t planes, bool keepsTransfer,
+                            const Picture& picture);
     Result<void> choosePipelines(const Placed& surface, MesoTarget::Drawing& drawing, const Shading& shading,
                                  bool inScene);
     MesoConstants constantsOf(size_t number, const FrameRequest& request) const;
     /// Records the ray that the next dispatches cast.
     void push(VkCommandBuffer commands, const frame::MesoLightRay& ray) const;
-    void dispatch(VkCommandBuffer commands, VkPipeline pipeline, const MesoTarget& target, size_t surface) const;
+    enum class Rays { OfPicture, OfLight };
+    void dispatch(VkCommandBuffer commands, VkPipeline pipeline, const MesoTarget& target, size_t surface,
+                  Rays rays = Rays::OfPicture) const;
 
     Device& device_;
     MesoResources& resources_;

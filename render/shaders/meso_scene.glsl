@@ -20,3 +20,13 @@ void keepInScene(uint pixel, float depth, uint normal, float lift, bool isFar) {
     sceneLight[sceneAt(kSceneNormal, pixel)] = normal;
     sceneLight[sceneAt(kSceneLift, pixel)] = floatBitsToUint(isFar ? -lift : lift);
 }
+
+// By how much rays of light start elsewhere than where a pixel's own ray is at its depth.
+void keepStart(uint pixel, vec3 off) {
+    for (uint i = 0u; i < kMesoStartPlanes; i++) hits[(kStarts + i) * scenePlane() + pixel] = floatBitsToUint(off[i]);
+}
+vec3 startOff(uint pixel) {
+    if (kStarts == 0u) return vec3(0.0);
+    uint at = kStarts * scenePlane() + pixel;
+    return uintBitsToFloat(uvec3(hits[at], hits[at + scenePlane()], hits[at + 2u * scenePlane()]));
+}

@@ -15,6 +15,7 @@ layout(constant_id = 5) const uint kTextures = 0u;  // kMesoColours, kMesoNormal
 layout(constant_id = 6) const uint kFromFar = 0u;  // 1: slabs that are less high than a part of a pixel are not marched
 layout(constant_id = 7) const uint kScene = 0u;    // 1: surfaces and datasets shade each other
 layout(constant_id = 8) const uint kTransfer = 0u;  // kMesoTransferKept, kMesoTransferRead
+layout(constant_id = 9) const uint kStarts = 0u;    // the planes of starts (kMesoStartPlanes)
 layout(local_size_x = 8, local_size_y = 8) in;
 
 uint fetchHit(uint i) { return hits[i]; }
@@ -83,7 +84,7 @@ void main() {
         if (depth >= kMesoNoHit) return;
         widthAtStart = pixelWidth(depth);
         widthGrowth = 0.0;
-        castSceneRay(pixel, index, eye + depth * d);
+        castSceneRay(pixel, index, eye + depth * d + startOff(index));
         return;
     }
     if (kRays == 1u) {
@@ -92,7 +93,7 @@ void main() {
         widthAtStart = pixelWidth(depth);
         widthGrowth = 0.0;
         vec3 n = unpackHitNormal(code);
-        castShadows(index, eye + depth * d + view.shadowLift * n, n);
+        castShadows(index, eye + depth * d + startOff(index) + view.shadowLift * n, n);
         return;
     }
     ShellKept kept = keptPart(eye, d);
@@ -117,5 +118,6 @@ void main() {
     hits[kMesoPlaneNormal * plane + index] = code;
     hits[kMesoPlaneLook * plane + index] = packUnorm4x8(vec4(look.colour, look.sky));
     hits[kMesoPlaneLight * plane + index] = packUnorm4x8(look.light);
+    if (kStarts != 0u) keepStart(index, vec3(0.0));
     if (kScene != 0u) keepInScene(index, kept.first + hit.t, code, view.shadowLift, look.sky < 1.0);
 }

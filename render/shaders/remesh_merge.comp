@@ -6,6 +6,7 @@
 layout(constant_id = 5) const uint kTextures = 0u;  // kMesoColours
 layout(constant_id = 7) const uint kScene = 0u;     // 1: surfaces and datasets shade each other
 layout(constant_id = 8) const uint kTransfer = 0u;
+layout(constant_id = 9) const uint kStarts = 0u;
 layout(local_size_x = 8, local_size_y = 8) in;
 
 uint fetchHit(uint i) { return hits[i]; }
@@ -37,16 +38,21 @@ uint remeshTexel(RemeshLevel level, int i) {
 
 RemeshFrame frameOf(uint triangle) {
     int first = 1 + int(triangle * kRemeshFrameQuads);
-    vec4 u = fetchBaseLight(first), v = fetchBaseLight(first + 1), turned = fetchBaseLight(first + 2);
+    vec4 u = fetchBaseLight(first), v = fetchBaseLight(first + 1), byU = fetchBaseLight(first + 2),
+         byV = fetchBaseLight(first + 3), direction = fetchBaseLight(first + 4), facet = fetchBaseLight(first + 5),
+         place = fetchBaseLight(first + 6);
     RemeshFrame frame;
     frame.byU = u.xyz;
     frame.byV = v.xyz;
-    frame.directionByU = turned.xyz;
-    frame.directionByV = fetchBaseLight(first + 3).xyz;
-    frame.direction = fetchBaseLight(first + 4).xyz;
+    frame.directionByU = byU.xyz;
+    frame.directionByV = byV.xyz;
+    frame.place = place.xyz;
+    frame.direction = direction.xyz;
     frame.at = vec2(u.w, v.w);
-    frame.facet = fetchBaseLight(first + 5).xyz;
-    frame.turned = turned.w;
+    frame.toSecond = vec2(byV.w, direction.w);
+    frame.toLast = vec2(facet.w, place.w);
+    frame.facet = facet.xyz;
+    frame.turned = byU.w;
     return frame;
 }
 
@@ -84,6 +90,10 @@ void main() {
     hits[kMesoPlaneLight * plane + index] = ~0u;  // before shadows, all of each light arrives
     hits[kMesoPlaneIterations * plane + index] += 1u;
     if (kTransfer != 0u) hits[kMesoPlaneTransfer * plane + index] = 0u;
+    if (kStarts != 0u) {
+        vec3 eye = view.eye.xyz + at.x * view.eyeX.xyz + at.y * view.eyeY.xyz;
+        keepStart(index, frame.turned != 0.0 ? remeshShellPoint(frame, hit.yz) - (eye + hit.x * d) : vec3(0.0));
+    }
     if (kScene == 0u) return;
     // Triangles err by up to a part of a pixel: rays of light begin half a pixel above them.
     keepInScene(index, hit.x, code, max(view.shadowLift, 0.5 * widthAt(pixel, hit.x)), false);

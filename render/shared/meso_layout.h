@@ -18,6 +18,9 @@ const uint kMesoPlaneDepth = 0u, kMesoPlaneNormal = 1u, kMesoPlaneLook = 2u, kMe
 const uint kMesoPlanes = 5u;
 // One more, where surfaces have transfer: the light from everywhere that a hit gets (packedLight; 0: none is known).
 const uint kMesoPlaneTransfer = 5u;
+// And three, where rays of light go through surfaces from remeshed ones: by how much they start elsewhere than where
+// the pixel's own ray is at its depth (kStarts: the first of them; 0: there are none).
+const uint kMesoStartPlanes = 3u;
 const uint kMesoTransferKept = 1u, kMesoTransferRead = 2u;  // kTransfer: the plane is there; the surface fills it
 
 const uint kMesoMaxSections = 6u;

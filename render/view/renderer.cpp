@@ -83,13 +83,17 @@ Result<void> Renderer::setBudgets(uint64_t budgetBytes, uint64_t ramBytes) {
 
 namespace {
 
-/// What heights take on the device is known before they are copied there.
+/// What heights take on the device, and what rays of light march, is known before it is copied there.
 Result<void> checkHeights(std::span<const MesoSurface> surfaces, uint64_t budgetBytes) {
-    std::set<const meso::HeightLevels*> all;
+    std::set<const void*> all;
     uint64_t bytes = 0;
-    for (const MesoSurface& surface : surfaces)
-        if (surface.remeshed.surface && all.insert(surface.remeshed.surface->heights.get()).second)
-            bytes += surface.remeshed.surface->heights->bytes();
+    for (const MesoSurface& surface : surfaces) {
+        if (!surface.remeshed.surface) continue;
+        const meso::HeightLevels& heights = *surface.remeshed.surface->heights;
+        if (all.insert(&heights).second) bytes += heights.bytes();
+        if (surface.arrays && all.insert(surface.arrays.get()).second)
+            bytes += surface.arrays->words.size() * sizeof(uint32_t);
+    }
     if (bytes <= budgetBytes) return {};
     return Error{
         .code = ErrorCode::Limit,

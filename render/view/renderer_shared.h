@@ -57,7 +57,7 @@ struct Renderer::Shared {
         std::unique_ptr<MesoResources> resources;
         std::unique_ptr<MesoSurfacePass> pass;
 
-        /// Whether rays go through any of them.
+        /// Whether rays of light go through any of them.
         [[nodiscard]] bool marches() const {
             return std::any_of(surfaces.begin(), surfaces.end(),
                                [](const MesoSurface& each) { return bool(each.arrays); });

@@ -35,8 +35,62 @@ protected:
         const auto method = buildMethod(asset, **shape, {.name = "pyramid"});
         MesoSurface made;
         made.arrays = std::make_shared<const MarchArrays>(*method->arrays());
-        made.shell = *buildShell(*makeBaseSurface(base, 2), height, asset.extent);
+        const BaseSurface surface = *makeBaseSurface(base, 2);
+        made.shell = *buildShell(surface, height, asset.extent);
+        made.lift = shadowLift(*made.arrays, tileEdge(surface));
         return made;
+    }
+    /// Remeshed, with what rays of light march.
+    static MesoSurface castingOf(const Asset& asset, std::string_view base, double height, double errorPixels) {
+        MesoSurface made = marchedOf(asset, base, height);
+        made.remeshed = surfaceOf(*asset.heights, base, height).remeshed;
+        made.remeshed.options.errorPixels = errorPixels;
+        return made;
+    }
+    static Asset assetOf(HeightMap map) {
+        Asset asset;
+        asset.extent = map.extent();
+        asset.heights = std::move(map);
+        return asset;
+    }
+    static FrameRequest inLowLight(FrameRequest request) {
+        request.shading.lightFollowsCamera = false;
+        request.shading.lightDirection = {0.8f, 0.3f, 0.3f};
+        return request;
+    }
+    /// Pixels that shadows darken, and those that face the light, whether it reaches them or not.
+    struct Shadows {
+        std::vector<bool> dark, facing;
+        [[nodiscard]] size_t count() const { return size_t(std::ranges::count(dark, true)); }
+        /// Pixels that face the light in both and are unlike all pixels about them in the other: the same surface may
+        /// be half a pixel aside.
+        [[nodiscard]] size_t differing(const Shadows& other) const {
+            size_t sum = 0;
+            for (int i = 0; i < int(dark.size()); ++i)
+                if (facing[size_t(i)] && other.facing[size_t(i)] && !other.hasAbout(i, dark[size_t(i)])) ++sum;
+            return sum;
+        }
+        [[nodiscard]] bool hasAbout(int pixel, bool isDark) const {
+            const int edge = int(kEdge);
+            for (int y = std::max(pixel / edge - 1, 0); y <= std::min(pixel / edge + 1, edge - 1); ++y)
+                for (int x = std::max(pixel % edge - 1, 0); x <= std::min(pixel % edge + 1, edge - 1); ++x)
+                    if (dark[size_t(y * edge + x)] == isDark) return true;
+            return false;
+        }
+    };
+    Shadows shadowsOf(const std::vector<MesoSurface>& surfaces, FrameRequest request) {
+        Shadows found;
+        depthsOf(surfaces, request);
+        const Picture open = *renderer_->readPicture();
+        const glm::vec3 light = glm::normalize(request.shading.lightDirection);
+        const auto normals = *renderer_->readNormals();
+        for (const glm::vec3 n : normals) found.facing.push_back(glm::dot(n, light) > 0.05f);
+        request.shading.shadows = true;
+        RendererFixture::draw(request);
+        const Picture shaded = *renderer_->readPicture();
+        for (size_t i = 0; i < found.facing.size(); ++i)
+            found.dark.push_back(shaded.rgba[4 * i] + 4 < open.rgba[4 * i]);
+        return found;
     }
     static HeightMap plateau() { return {{8, 8}, 0.25, std::vector<uint16_t>(64, 39321)}; }
     static FrameRequest lookFrom(glm::dvec3 eye, bool isOrthographic = false) {
@@ -160,6 +214,58 @@ TEST_F(RemeshedSurfaces, LookLikeMarchedOnes) {
             ASSERT_EQ(either[i], std::min(depths[i], truth[i])) << i;
             ASSERT_EQ(other[i], std::min(depths[i], truth[i])) << i;
         }
+    }
+}
+
+/// Rays of light march the map from where it is in a pixel, however far off the triangle is that is drawn there: seen
+/// from straight above, no height moves a pixel, and triangles are as large as they may be.
+TEST_F(RemeshedSurfaces, CastTheShadowsOfMarchedOnes) {
+    const Asset asset = assetOf(*makeHeightField("fbm", 64, 1));
+    for (const auto base : {"quad", "torus"})
+        for (const bool isFromAbove : {false, true}) {
+            SCOPED_TRACE(std::string(base) + (isFromAbove ? " from above" : ""));
+            const FrameRequest request = inLowLight(isFromAbove ? lookFrom({0, 0, 5}, true) : lookFrom({2.4, 1.8, 3}));
+            const Shadows marched = shadowsOf({marchedOf(asset, base, 0.3)}, request),
+                          remeshed = shadowsOf({castingOf(asset, base, 0.3, 0.5)}, request);
+            EXPECT_GT(marched.count(), 300u);
+            EXPECT_LT(marched.differing(remeshed) + remeshed.differing(marched), marched.count() / 50);
+        }
+}
+
+TEST_F(RemeshedSurfaces, FlatOnesAreNotInTheirOwnShadow) {
+    const MesoSurface flat = castingOf(assetOf(plateau()), "quad", 0.5, 0.5);
+    for (const double distance : {2.0, 5.0, 200.0})
+        EXPECT_EQ(shadowsOf({flat}, inLowLight(lookFrom({0, 0, distance}))).count(), 0u) << distance;
+}
+
+TEST_F(RemeshedSurfaces, CastNothingWithoutWhatRaysMarch) {
+    MesoSurface surface = castingOf(assetOf(*makeHeightField("maze", 64, 1)), "quad", 0.3, 0.5);
+    const FrameRequest request = inLowLight(lookFrom({0, 0, 5}));
+    EXPECT_GT(shadowsOf({surface}, request).count(), 300u);
+    surface.arrays = nullptr, surface.shell = {};
+    EXPECT_EQ(shadowsOf({surface}, request).count(), 0u);
+}
+
+/// On a marched floor, by rays to the light alone and where all is lit at once, as with occlusion.
+TEST_F(RemeshedSurfaces, ShadeWhatIsBelowThem) {
+    const Asset asset = assetOf(*makeHeightField("fbm", 64, 1));
+    MesoSurface floor = marchedOf(assetOf(plateau()), "quad", 0.2);
+    BaseSurface wide = *makeBaseSurface("quad", 2);
+    for (glm::dvec3& p : wide.positions) p = 3.0 * p - glm::dvec3(0, 0, 2);
+    floor.shell = *buildShell(wide, 0.2, plateau().extent());
+    for (const uint32_t occlusionRays : {0u, 1u}) {
+        SCOPED_TRACE(occlusionRays);
+        FrameRequest request = inLowLight(lookFrom({0, -2, 6}));
+        request.shading.lightDirection = {0.5f, 0.3f, 0.8f};
+        request.shading.occlusionRays = occlusionRays;
+        const Shadows alone = shadowsOf({floor}, request),
+                      marched = shadowsOf({floor, marchedOf(asset, "sphere", 0.1)}, request),
+                      remeshed = shadowsOf({floor, castingOf(asset, "sphere", 0.1, 0.5)}, request),
+                      before = shadowsOf({castingOf(asset, "sphere", 0.1, 0.5), floor}, request);
+        EXPECT_EQ(alone.count(), 0u);
+        EXPECT_GT(marched.count(), 300u);
+        EXPECT_LT(marched.differing(remeshed) + remeshed.differing(marched), marched.count() / 50);
+        EXPECT_LT(before.differing(remeshed), marched.count() / 50);
     }
 }
 

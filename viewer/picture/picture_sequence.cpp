@@ -69,6 +69,8 @@ Result<void> PictureSequence::finish() {
     stats_.ms += drawn.ms;
     stats_.errorPixels = std::max(stats_.errorPixels, drawn.errorPixels);
     stats_.colourPixels = std::max(stats_.colourPixels, drawn.colourPixels);
+    stats_.remeshedPixels = std::max(stats_.remeshedPixels, drawn.remeshedPixels);
+    stats_.uncertifiedPatches = std::max(stats_.uncertifiedPatches, drawn.uncertifiedPatches);
     stats_.update = drawn.update;
     stats_.onHost = drawn.onHost;
     depth_.clear();

@@ -89,7 +89,8 @@ private:
 class Remeshing {
 public:
     /// Takes the asset's heights.
-    Result<MesoSurface> make(const MesoSurfaceDescription& d, Asset& asset, const BaseSurface& base) {
+    Result<MesoSurface> make(const MesoSurfaceDescription& d, Asset& asset, const BaseSurface& base,
+                             std::vector<std::string>& warnings) {
         if (!asset.heights)
             return Error{.code = ErrorCode::Usage,
                          .message = fmt::format("{} is for height fields; {} is a solid", kRemeshMethod, asset.name)};
@@ -100,15 +101,16 @@ public:
         // Certified cells take heights from the map, and of coarser levels normals alone.
         const bool isLarge = asset.heights->texels.size() > kMostFittedTexels;
         const LevelFit fit = d.errorPixels > 0 || isLarge ? LevelFit::Averaged : LevelFit::Least;
-        auto& levels = levels_[{d.asset, d.withFilter, fit}];
+        auto& [levels, arrays] = levels_[{d.asset, d.withFilter, fit}];
         if (!levels) {
+            arrays = castingArrays(*asset.heights);
             LevelFitOptions options{.fit = fit};
             if (!d.withFilter) options.mostLevels = 1;
             VCP_TRY_ASSIGN(auto made, HeightLevels::build(std::move(*asset.heights), options));
             levels = std::make_shared<const HeightLevels>(std::move(made));
         }
-        auto made =
-            buildRemeshSurface(base, levels, d.heightScale * tileEdge(base) * asset.extent.z, d.offset * d.scale);
+        const double edge = tileEdge(base), height = d.heightScale * edge * asset.extent.z;
+        auto made = buildRemeshSurface(base, levels, height, d.offset * d.scale);
         if (!made) {
             Error error = made.error();
             if (isFile(d)) error.file = d.base;
@@ -121,11 +123,31 @@ public:
                              .shareOut = [](size_t count, const std::function<void(size_t first, size_t last)>& fill) {
                                  return shareOut(count, fill, {});
                              }}};
+        surface.withBase = d.withBase;
+        auto shell =
+            arrays
+                ? buildShell(base, height, asset.extent, d.offset * d.scale)
+                : Error{.message = fmt::format("rays are marched over at most {} texels along an edge", kMaxGridEdge)};
+        if (!shell) {
+            warnings.push_back(fmt::format("{} casts no shadows: {}", d.asset, shell.error().message));
+            return surface;
+        }
+        surface.arrays = arrays, surface.shell = *std::move(shell), surface.lift = shadowLift(*arrays, edge);
         return surface;
     }
 
 private:
-    std::map<std::tuple<std::string, bool, LevelFit>, std::shared_ptr<const HeightLevels>> levels_;
+    /// Returns what rays of light march; null where the map has too many texels for rays.
+    static std::shared_ptr<const MarchArrays> castingArrays(const HeightMap& map) {
+        if (std::max(map.size.x, map.size.y) > kMaxGridEdge) return nullptr;
+        return std::make_shared<const MarchArrays>(pyramidArrays(map));
+    }
+
+    struct Made {
+        std::shared_ptr<const HeightLevels> levels;
+        std::shared_ptr<const MarchArrays> arrays;
+    };
+    std::map<std::tuple<std::string, bool, LevelFit>, Made> levels_;
 };
 
 using Transfer = std::shared_ptr<const TransferVolume>;
@@ -286,7 +308,7 @@ Result<MesoScene> makeMesoScene(std::span<const MesoSurfaceDescription> descript
         if (!transfer) return d.from.blamed(transfer.error());
         VCP_TRY(bases.add(d, *asset, *base, *transfer));
         if (d.method.name == kRemeshMethod) {
-            auto surface = remeshing.make(d, *asset, *base);
+            auto surface = remeshing.make(d, *asset, *base, scene.warnings);
             if (!surface) return d.from.blamed(surface.error());
             VCP_TRY_ASSIGN(surface->colours, textures.colours(d.colourTexture));
             VCP_TRY_ASSIGN(surface->normals, textures.normals(d.normalTexture));

@@ -314,7 +314,7 @@ void ViewSession::clickAt(glm::dvec2 pixel) {
     if (const auto seen = viewer_->hitAt(pixel); seen && seen->onSurface) {
         if (clicks_ == Clicks::Annotate) return annotate(seen->position);
         // It may be the one that is seen, and rays do not find it.
-        const auto isRemeshed = [](const MesoSurface& surface) { return !surface.arrays; };
+        const auto isRemeshed = [](const MesoSurface& surface) { return surface.remeshed.surface != nullptr; };
         if (std::any_of(surfaces.begin(), surfaces.end(), isRemeshed)) return note(kErrorUnknown);
     }
     // A cap is the section plane itself: its points are exact.

@@ -10,9 +10,12 @@
 #include <gtest/gtest.h>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <glm/mat3x3.hpp>
+#include <glm/matrix.hpp>
 
 #include "mesostructure/remesh/remesh_frames.h"
 #include "mesostructure/remesh/remesh_math.h"
+#include "mesostructure/shell.h"
 #include "mesostructure/solids.h"
 #include "tests/support/remeshed_views.h"
 
@@ -275,6 +278,42 @@ TEST(Remesher, NormalsAreThoseOfTheDisplacedSurface) {
                 ASSERT_GT(glm::dot(normal, frame.facet), 0);
             }
         }
+}
+
+/// Against the pieces of the shell themselves, which say where a place of the map is.
+TEST(Remesher, PointsOfTheShellAreWhereRaysMeetTheMap) {
+    for (const auto base : {"sphere", "box", "cylinder", "torus"}) {
+        const BaseSurface from = *makeBaseSurface(base, 2);
+        const RemeshSurface surface = surfaceOf(from, 0.1, "fbm");
+        RemeshHeights<double> heights{{surface.heights.get()}};
+        Shell shell;
+        const auto pieces = shellPieces(from, 0.1, {1, 1, 1}, 0, shell);
+        ASSERT_EQ(pieces.size(), 3 * surface.triangles.size());
+        double farthest = 0;
+        for (size_t i = 0; i < surface.triangles.size(); i += 5) {
+            SCOPED_TRACE(std::string(base) + " " + std::to_string(i));
+            const auto& uvs = surface.uvs[i];
+            for (const dvec2 w : {dvec2(0.3, 0.4), dvec2(0.7, 0.1), dvec2(0.05, 0.9), dvec2(0.1, 0.15)}) {
+                const dvec2 at = (1 - w.x - w.y) * dvec2(uvs[0]) + w.x * dvec2(uvs[1]) + w.y * dvec2(uvs[2]);
+                const dvec3 point =
+                    heights.remeshShellPoint(remeshFrame(surface, i), at) + surface.origin - shell.origin;
+                double nearest = 1e30;
+                for (size_t k = 3 * i; k < 3 * i + 3; ++k) {
+                    const ShellPiece& piece = pieces[k];
+                    const glm::dmat3 edges(piece.tile[1] - piece.tile[0], piece.tile[2] - piece.tile[0],
+                                           piece.tile[3] - piece.tile[0]);
+                    const dvec3 b = glm::inverse(edges) * (dvec3(at, surface.heights->height(0, at)) - piece.tile[0]);
+                    if (std::min({b.x, b.y, b.z, 1 - b.x - b.y - b.z}) < -1e-6) continue;
+                    const dvec3 expected = piece.corners[0] + b.x * (piece.corners[1] - piece.corners[0]) +
+                                           b.y * (piece.corners[2] - piece.corners[0]) +
+                                           b.z * (piece.corners[3] - piece.corners[0]);
+                    nearest = std::min(nearest, glm::distance(point, expected));
+                }
+                farthest = std::max(farthest, nearest);
+            }
+        }
+        EXPECT_LT(farthest, 1e-6);
+    }
 }
 
 /// Eyes within the slab, beneath it and above: the nearest depth cuts nothing that is seen.

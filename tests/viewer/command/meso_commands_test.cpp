@@ -109,9 +109,20 @@ TEST_F(MesoCommands, LargeMapsAreHeightsAlone) {
     EXPECT_GT(figures["remeshed_pixels"], 0);
     EXPECT_LE(figures["remeshed_pixels"], 0.5);
     EXPECT_GT(figures["surface_bytes"], 2 * 4104 * 4104);
+    EXPECT_NE(drawn.err.find("casts no shadows: rays are marched over at most 4096 texels"), std::string::npos)
+        << drawn.err;
     const Ran marched = draw(R"("boxes")");
     EXPECT_EQ(marched.status, 1);
     EXPECT_NE(marched.err.find("at most 4096"), std::string::npos) << marched.err;
+}
+
+TEST_F(MesoCommands, SequencesSayWhatIsCertified) {
+    std::ofstream(path("scene.json")) << R"({"mesostructure": [{"asset": "ridged", "method": "remesh"}]})";
+    const Ran drawn =
+        run("render " + path("scene.json") + " --size 64x48 --turntable 2 --samples 1 --json -o " + path("turn.png"));
+    ASSERT_EQ(drawn.status, 0) << drawn.err;
+    EXPECT_GT(Json::parse(drawn.out)["remeshed_pixels"], 0);
+    EXPECT_LE(Json::parse(drawn.out)["remeshed_pixels"], 0.5);
 }
 
 TEST_F(MesoCommands, MeshesMustBeClosed) {

@@ -272,6 +272,9 @@ TEST(SceneFile, SurfacesMayBeRemeshed) {
     const auto made = makeMesoScene(scene->surfaces);
     ASSERT_TRUE(made) << made.error().line();
     EXPECT_TRUE(made->surfaces[0].remeshed.surface);
+    EXPECT_TRUE(made->surfaces[0].arrays) << "it casts shadows";
+    EXPECT_GT(made->surfaces[0].lift, 0);
+    EXPECT_TRUE(made->warnings.empty());
     EXPECT_EQ(made->surfaces[0].remeshed.options.cell, 5);
     EXPECT_EQ(made->surfaces[0].remeshed.options.errorPixels, 0.5);
     for (const double error : {0.0, 0.05, 4.0}) {
