@@ -7,10 +7,6 @@ function(vcp_options target)
     target_compile_features(${target} PUBLIC cxx_std_20)
     set_target_properties(${target} PROPERTIES CXX_EXTENSIONS OFF POSITION_INDEPENDENT_CODE ON)
     target_compile_options(${target} PRIVATE -Wall -Wextra -Wshadow -Wconversion -Wno-sign-conversion)
-    # Of sources compiled as one, GCC calls what is private to one of them private to a header.
-    if(CMAKE_UNITY_BUILD AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
-        target_compile_options(${target} PRIVATE -Wno-subobject-linkage)
-    endif()
     # Results must not depend on how a compiler fuses or reorders arithmetic.
     target_compile_options(${target} PRIVATE -ffp-contract=off)
     if(VCP_WERROR)
