@@ -1,13 +1,10 @@
 #include "render/host_layer.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
-
-#include "octree/surface/morton.h"
 
 namespace vcp {
 
@@ -37,14 +34,7 @@ Result<CutScene> CutScene::create(const FileHeader& header, bool withColour, std
         const uint64_t colours = withColour ? entry.colourBytes : 0;
         made.views_.push_back(
             viewOfChecked(each.bytes.first(entry.pageBytes), each.bytes.subspan(entry.pageBytes, colours)));
-        appendDrawn(pages,
-                    {.view = &made.views_.back(),
-                     .number = each.number,
-                     .place = mortonDecode(entry.morton),
-                     .level = entry.level,
-                     .error = float(double(entry.certifiedError) / header.cell),
-                     .parts = entry.parts},
-                    each.octants);
+        appendDrawn(pages, hostPage(header, each.number, entry, made.views_.back()), each.octants);
     }
     VCP_TRY_ASSIGN(made.scene_, HostScene::create(hostGrid(header), pages));
     return made;

@@ -10,8 +10,8 @@ namespace vcp {
 
 namespace {
 
-Error badCut(const HostPage& page, const char* what) {
-    return {.code = ErrorCode::Usage, .message = what, .element = fmt::format("page {}", page.number)};
+Error badCut(uint64_t page, const char* what) {
+    return {.code = ErrorCode::Usage, .message = what, .element = fmt::format("page {}", page)};
 }
 
 }  // namespace
@@ -24,6 +24,15 @@ HostGrid hostGrid(const FileHeader& header) {
 }
 
 uint32_t HostScene::rootBits() const { return grid_.log2Cells + grid_.levels - 1 + kMaxSubcellDepth; }
+
+HostPage hostPage(const FileHeader& header, uint64_t number, const PageEntry& entry, const PageView& view) {
+    return {.view = &view,
+            .number = number,
+            .place = mortonDecode(entry.morton),
+            .level = entry.level,
+            .error = float(double(entry.certifiedError) / header.cell),
+            .parts = entry.parts};
+}
 
 void appendDrawn(std::vector<HostPage>& pages, HostPage page, uint32_t octants) {
     if (octants == 0) pages.push_back(page);
@@ -42,20 +51,15 @@ Result<HostScene> HostScene::create(const HostGrid& grid, std::span<const HostPa
 
 Result<HostScene> HostScene::create(const PageCache& cache, std::span<const uint64_t> cut,
                                     std::span<const uint8_t> octants) {
-    const FileHeader& header = cache.dataset().header;
+    const Dataset& dataset = cache.dataset();
     std::vector<HostPage> pages;
     for (size_t i = 0; i < cut.size(); ++i) {
-        const uint64_t number = cut[i];
-        HostPage page{.view = cache.view(number), .number = number};
-        if (!page.view) return badCut(page, "a page of the cut is not loaded");
-        const PageEntry& entry = cache.dataset().pages[number];
-        page.place = mortonDecode(entry.morton);
-        page.level = entry.level;
-        page.parts = entry.parts;
-        page.error = float(double(entry.certifiedError) / header.cell);
-        appendDrawn(pages, page, octants.empty() ? 0 : octants[i]);
+        const PageView* view = cache.view(cut[i]);
+        if (!view) return badCut(cut[i], "a page of the cut is not loaded");
+        appendDrawn(pages, hostPage(dataset.header, cut[i], dataset.pages[cut[i]], *view),
+                    octants.empty() ? 0 : octants[i]);
     }
-    return create(hostGrid(header), pages);
+    return create(hostGrid(dataset.header), pages);
 }
 
 std::optional<uint32_t> HostScene::pageAt(glm::dvec3 point) const {
@@ -78,9 +82,9 @@ Result<void> HostScene::add(const HostPage& page) {
     const glm::uvec3 place =
         page.octant ? 2u * page.place + glm::uvec3(part & 1, part >> 1 & 1, part >> 2) : page.place;
     if (level >= grid_.levels || page.view->header.log2Cells != grid_.log2Cells)
-        return badCut(page, "is no page of this grid");
+        return badCut(page.number, "is no page of this grid");
     for (int axis = 0; axis < 3; ++axis)
-        if (place[axis] >> level != 0) return badCut(page, "lies outside of the grid");
+        if (place[axis] >> level != 0) return badCut(page.number, "lies outside of the grid");
     Child at = root_;
     Node* parent = nullptr;
     uint32_t octant = 0;
@@ -88,7 +92,7 @@ Result<void> HostScene::add(const HostPage& page) {
     for (uint32_t depth = 0;; ++depth) {
         const bool isPlace = depth == level;
         if (at.kind == Child::Kind::Page || (isPlace && at.kind == Child::Kind::Node))
-            return badCut(page, "and another page of the cut lie one in the other");
+            return badCut(page.number, "and another page of the cut lie one in the other");
         if (at.kind == Child::Kind::None) {
             at = isPlace ? Child{Child::Kind::Page, uint32_t(pages_.size())}
                          : Child{Child::Kind::Node, uint32_t(nodes_.size())};

@@ -37,6 +37,9 @@ struct HostPage {
     uint8_t parts = 0;  ///< as PageEntry's
 };
 
+/// Returns the page of an entry of the directory, whole.
+HostPage hostPage(const FileHeader& header, uint64_t number, const PageEntry& entry, const PageView& view);
+
 /// Appends a page or, where some of its octants alone are drawn (bits), each of these.
 void appendDrawn(std::vector<HostPage>& pages, HostPage page, uint32_t octants);
 

@@ -63,7 +63,7 @@ def bake(vcp, folder, name, mesh, *options):
     return json.loads((folder / name / "scene.json").read_text())["mesostructure"][0]
 
 
-def write_cameras(path, centre, size, up):
+def write_cameras(path, rounds, centre, size, up):
     cameras = []
     for azimuth, elevation, distance in VIEWS:
         a, e = math.radians(azimuth), math.radians(elevation)
@@ -72,7 +72,7 @@ def write_cameras(path, centre, size, up):
             aside = (aside[0], aside[2], -aside[1])
         cameras.append({"position": [c + distance * size * d for c, d in zip(centre, aside)], "target": centre,
                         "up_axis": up})
-    path.write_text(json.dumps(cameras + cameras))
+    path.write_text(json.dumps(rounds * cameras))
 
 
 def measure(vcp, folder, name, surface, look):
@@ -86,8 +86,7 @@ def measure(vcp, folder, name, surface, look):
         seconds, told = [], {}
         for rounds in (1, 2):
             cameras = folder / name / "cameras.json"
-            write_cameras(cameras, *look)
-            cameras.write_text(json.dumps(json.loads(cameras.read_text())[: rounds * len(VIEWS)]))
+            write_cameras(cameras, rounds, *look)
             out, took = run(vcp, "render", scene, "-o", folder / name / "picture.png", "--overwrite",
                             "--size", "1920x1200", "--samples", 1, "--device", "llvmpipe", "--path", cameras,
                             "--frames", rounds * len(VIEWS), "--progress", "none", "--json")

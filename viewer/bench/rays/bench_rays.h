@@ -80,8 +80,12 @@ bool benchHasEmbree();
 /// buildOctree report, Cancelled.
 Result<BenchRaysReport> benchRays(const BenchRaysOptions& options);
 
+/// Returns the models of a report's rows, in their order.
+std::vector<std::string> modelsOf(const BenchRaysReport& report);
+
 /// The report as one JSON object {"rows": [...], "stability": [...]}, as CSV with a header line (the rows), and as
-/// Markdown: the table, beside the paper's Tables 1 and 2 where the rows for it are there, and stability.
+/// Markdown: the table, beside the paper's Tables 1 and 2 and its Fig. 1 where the rows for it are there, and
+/// stability.
 std::string benchRaysJson(const BenchRaysReport& report);
 std::string benchRaysCsv(const BenchRaysReport& report);
 std::string benchRaysMarkdown(const BenchRaysReport& report);

@@ -131,6 +131,13 @@ std::string plotOf(const std::vector<const BenchRaysRow*>& rows, const PlottedVa
 
 }  // namespace
 
+std::vector<std::string> modelsOf(const BenchRaysReport& report) {
+    std::vector<std::string> models;
+    for (const BenchRaysRow& row : report.rows)
+        if (std::ranges::find(models, row.model) == models.end()) models.push_back(row.model);
+    return models;
+}
+
 std::string benchRaysJson(const BenchRaysReport& report) {
     Json json{{"rows", rowsOf(report)}};
     for (const StabilityRow& row : report.stability) json["stability"].push_back(toJson(row));
@@ -172,10 +179,7 @@ std::string benchRaysMarkdown(const BenchRaysReport& report) {
 
 std::vector<std::pair<std::string, std::string>> benchRaysPlots(const BenchRaysReport& report) {
     std::vector<std::pair<std::string, std::string>> plots;
-    std::vector<std::string> models;
-    for (const BenchRaysRow& row : report.rows)
-        if (std::ranges::find(models, row.model) == models.end()) models.push_back(row.model);
-    for (const std::string& model : models) {
+    for (const std::string& model : modelsOf(report)) {
         std::vector<const BenchRaysRow*> rows;
         for (const BenchRaysRow& row : report.rows)
             if (row.model == model) rows.push_back(&row);

@@ -110,10 +110,7 @@ std::optional<PeerCell> peerCellWith(std::span<const PeerPoint> points, double v
 
 std::string levelsSavedMarkdown(const BenchRaysReport& report) {
     std::string atError, atBytes;
-    std::vector<std::string> models;
-    for (const BenchRaysRow& row : report.rows)
-        if (std::ranges::find(models, row.model) == models.end()) models.push_back(row.model);
-    for (const std::string& model : models) {
+    for (const std::string& model : modelsOf(report)) {
         const std::vector<MeanRow> means = meansOf(report, model);
         const bool hasPeers = std::ranges::any_of(
             kPeers, [&](const char* peer) { return pointsOf(means, peer, &MeanRow::p50).size() > 1; });
@@ -134,8 +131,8 @@ std::string levelsSavedMarkdown(const BenchRaysReport& report) {
     }
     if (atError.empty()) return {};
     return "\n### Levels saved (their Fig. 1)\n\nBy how many levels a peer's tree is deeper where it has the same "
-           "error; "
-           "below 0 it is shallower. Interpolated in\nthe logarithm of the cell; ~: beyond the cells that were swept, "
+           "error; below 0 it is shallower. Interpolated in\nthe logarithm of the cell; ~: beyond the cells that were "
+           "swept, "
            "along the last two; never: its error does not\nfall with the cell. Published: 3 levels (Sponza) and 1 to 5 "
            "(Thai statue) fewer than voxels.\n\n"
            "| model | `paper` | error | signed distance | voxels | contours |\n|---|---|---|---|---|---|\n" +
