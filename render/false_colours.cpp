@@ -8,6 +8,8 @@ namespace vcp {
 
 bool isFalseColour(ShadingMode mode) { return mode >= ShadingMode::Steps && mode <= ShadingMode::Error; }
 
+bool showsWork(ShadingMode mode) { return mode >= ShadingMode::Steps && mode <= ShadingMode::Fetches; }
+
 bool hasHitNumbers(ShadingMode mode) { return isFalseColour(mode) || mode == ShadingMode::Wireframe; }
 
 glm::vec3 falseColour(double part) { return f32::heat(float(part)); }

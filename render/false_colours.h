@@ -10,6 +10,9 @@ namespace vcp {
 /// Whether the mode shows numbers, as colours from blue through green to red.
 bool isFalseColour(ShadingMode mode);
 
+/// Whether pixels show the work of their rays.
+bool showsWork(ShadingMode mode);
+
 /// Whether the mode shows a number of each hit: as a false colour, or as a line.
 bool hasHitNumbers(ShadingMode mode);
 

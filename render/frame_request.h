@@ -142,7 +142,6 @@ struct FrameRequest {
     std::vector<SectionPlane> sections;     ///< at most kMostSections
     Caps sectionCaps = Caps::None;          ///< without sections there are none
     bool beam = true;                       ///< beam pass; the picture is the same without it, only slower
-    bool countSteps = false;                ///< fills FrameStats::steps and fetches (a slower variant)
     PaperMarch march;                       ///< march through datasets of the method `paper`
     std::vector<DatasetLook> looks;         ///< of datasets that are shown otherwise than as they are
     std::vector<uint32_t> hidden;           ///< numbers of datasets that are neither drawn nor loaded, in any order

@@ -22,9 +22,8 @@ struct FrameStats {
     /// From submission to completion, wall clock. Of renderAhead(): GPU time of all passes, where the device has a
     /// clock.
     double msFrame = 0;
-    uint64_t steps = 0, fetches = 0;  ///< node visits and 16-byte reads of all rays; with countSteps only
-    uint64_t poolBytes = 0;           ///< bytes allocated for the pool
-    uint64_t colourBytes = 0;         ///< bytes of colour in the pool
+    uint64_t poolBytes = 0;    ///< bytes allocated for the pool
+    uint64_t colourBytes = 0;  ///< bytes of colour in the pool
     uint32_t pagesInCut = 0;
     uint32_t pipelines = 0;  ///< pipelines made since create()
     double msSurfaces = 0;   ///< GPU time of surfaces with mesostructure

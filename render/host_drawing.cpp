@@ -6,8 +6,7 @@
 #include <optional>
 #include <tuple>
 
-#include <fmt/format.h>
-
+#include "render/false_colours.h"
 #include "render/frame_setup.h"
 #include "render/host/lit_layers.h"
 #include "render/host_layer.h"
@@ -16,11 +15,6 @@
 namespace vcp {
 
 namespace {
-
-Error unsupported(const char* what) {
-    return {.code = ErrorCode::Unsupported,
-            .message = fmt::format("the host does not draw {}; take a Vulkan device", what)};
-}
 
 /// A dataset's layer of a picture, and what the layer points to.
 struct PlacedLayer {
@@ -114,19 +108,14 @@ Result<void> checkHostDraws(const Dataset& dataset, const std::string& name) {
     return {};
 }
 
-Result<void> checkHostDraws(const FrameRequest& request) {
-    const ShadingMode mode = request.shading.mode;
-    if (mode == ShadingMode::Steps || mode == ShadingMode::Cells || mode == ShadingMode::Fetches || request.countSteps)
-        return unsupported("the work of rays");
-    return {};
-}
-
 Result<std::vector<PreparedSurface>> prepareOnHost(std::span<const MesoSurface> surfaces) {
     using Words = std::shared_ptr<const std::vector<uint64_t>>;
     std::map<LookKey, Words> known;
     std::vector<PreparedSurface> prepared;
     for (const MesoSurface& surface : surfaces) {
-        if (!surface.arrays || surface.remeshed.surface) return unsupported("remeshed surfaces");
+        if (!surface.arrays || surface.remeshed.surface)
+            return Error{.code = ErrorCode::Unsupported,
+                         .message = "the host does not draw remeshed surfaces; take a Vulkan device"};
         MesoLook look = mesoLook(surface);
         Words& words = known[lookKey(surface)];
         if (!words) words = std::make_shared<const std::vector<uint64_t>>(std::move(look.looks));
@@ -166,6 +155,7 @@ Result<HostPicture> drawOnHost(std::span<const HostDataset> datasets, std::span<
                                const FrameRequest& request, const std::function<bool()>& cancel) {
     const HostCastOptions options{.cancel = cancel};
     HostPicture picture({int(request.width), int(request.height)}, backgroundRows(request));
+    if (showsWork(request.shading.mode)) picture.work.resize(picture.colours.size());
     std::vector<PlacedLayer> placed;
     for (const HostDataset& each : datasets) placed.push_back({each, {}, {}, {}});
     std::vector<HostLayer> layers;

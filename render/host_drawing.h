@@ -29,9 +29,6 @@ struct HostDataset {
 /// Refuses what the host does not draw of a dataset. `name`: its file's. Errors: Unsupported.
 Result<void> checkHostDraws(const Dataset& dataset, const std::string& name);
 
-/// Refuses what the host does not draw of a request. Errors: Unsupported.
-Result<void> checkHostDraws(const FrameRequest& request);
-
 /// A surface with mesostructure as the host draws it. Refers to the one that it was made of.
 struct PreparedSurface {
     const MesoSurface* surface;

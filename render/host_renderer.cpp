@@ -81,7 +81,6 @@ Result<void> HostRenderer::setSurfaces(std::span<const MesoSurface> surfaces) {
 
 Result<UpdateResult> HostRenderer::update(const FrameRequest& request) {
     VCP_TRY(checkRequest(request));
-    VCP_TRY(checkHostDraws(request));
     std::vector<ShownResidency> shown;
     for (size_t i = 0; i < datasets_.size(); ++i)
         if (!isHidden(request, i))
@@ -98,7 +97,6 @@ Result<UpdateResult> HostRenderer::update(const FrameRequest& request) {
 Result<FrameStats> HostRenderer::render(const FrameRequest& request, const std::function<bool()>& cancel) {
     picture_.reset();
     VCP_TRY(checkRequest(request));
-    VCP_TRY(checkHostDraws(request));
     const auto began = std::chrono::steady_clock::now();
     const std::vector<HostDataset> drawing = drawn(request);
     VCP_TRY_ASSIGN(auto picture, drawOnHost(drawing, prepared_, request, cancel));
@@ -152,6 +150,12 @@ Result<std::vector<float>> HostRenderer::readDepth() {
 Result<std::vector<glm::vec3>> HostRenderer::readNormals() {
     if (!picture_) return kNothingDrawn;
     return picture_->normals;
+}
+
+Result<std::vector<uint32_t>> HostRenderer::readWork() {
+    if (!picture_) return kNothingDrawn;
+    if (picture_->work.empty()) return kNoWorkShown;
+    return picture_->work;
 }
 
 Result<std::vector<uint32_t>> HostRenderer::readIterations() {

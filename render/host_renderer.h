@@ -30,6 +30,7 @@ public:
     Result<Picture> readPicture() override;
     Result<std::vector<float>> readDepth() override;
     Result<std::vector<glm::vec3>> readNormals() override;
+    Result<std::vector<uint32_t>> readWork() override;
     Result<std::vector<uint32_t>> readIterations() override;
     [[nodiscard]] std::vector<std::string> validationMessages() const override { return {}; }
 

@@ -86,12 +86,18 @@ public:
     /// Distances in world units along the unit ray; infinity where nothing is hit, not a number where the ray gave up.
     virtual Result<std::vector<float>> readDepth() = 0;
     virtual Result<std::vector<glm::vec3>> readNormals() = 0;  ///< unit, towards the viewer; 0 where no hit
+    /// Returns the number behind the false colour of each pixel: steps, cells or fetches of its ray through all
+    /// datasets. Errors: Usage, where the last picture does not show work.
+    virtual Result<std::vector<uint32_t>> readWork() = 0;
     /// Returns each pixel's iterations in mesostructure, over all pieces that its ray passed; all 0 without surfaces.
     virtual Result<std::vector<uint32_t>> readIterations() = 0;
 
     /// Returns validation messages (warnings and errors) so far; always empty without options.validation.
     [[nodiscard]] virtual std::vector<std::string> validationMessages() const = 0;
 };
+
+/// What readWork() reports where the last picture does not show work.
+inline const Error kNoWorkShown{.code = ErrorCode::Usage, .message = "the last picture does not show work"};
 
 /// Makes the renderer that the options name: the host's for kHostName, and where nothing is named and there is no
 /// Vulkan device; else one of Vulkan. Errors: as of Renderer::create and HostRenderer::create.

@@ -45,8 +45,7 @@ glm::dvec2 sampleOffset(uint32_t sample) {
 }
 
 uint32_t samplesOf(const FrameRequest& request, uint32_t asked) {
-    const bool showsNumbers =
-        isFalseColour(request.shading.mode) || request.shading.mode == ShadingMode::Normals || request.countSteps;
+    const bool showsNumbers = isFalseColour(request.shading.mode) || request.shading.mode == ShadingMode::Normals;
     return showsNumbers ? 1 : std::clamp(asked, 1u, kMostSamples);
 }
 

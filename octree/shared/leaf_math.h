@@ -250,6 +250,26 @@ INLINE Real3 intersectEdgeOn(Real3 d, Real3 va, Real3 vb, Real3 vc, Real limit) 
     return near ? Real3(s, wb * scale, wc * scale) : Real3(Real(1e30), Real(0.0), Real(0.0));
 }
 
+// Returns the point of the line through p along e that is nearest to the origin.
+INLINE Real3 nearestOn(Real3 p, Real3 e) { return p - e * (dot(p, e) / dot(e, e)); }
+
+// Finds where a line s d meets a needle, whose weights are little but rounding, not edge-on: at its plane, which is
+// taken from the point of its longest edge that is nearest to the origin. The line passes its edges on the inner side,
+// or in their slack. The result is that of intersectTriangle.
+INLINE Real3 intersectNeedle(Real3 d, Real3 va, Real3 vb, Real3 vc, Real slack) {
+    Real3 ab = vb - va, bc = vc - vb, ca = va - vc, n = cross(ab, vc - va);
+    Real la = dot(bc, bc), lb = dot(ca, ca), lc = dot(ab, ab), longest = max(la, max(lb, lc));
+    bool isA = la >= longest, isB = !isA && lb >= longest;
+    Real3 from = isA ? vb : isB ? vc : va, edge = isA ? bc : isB ? ca : ab;
+    Real s = dot(nearestOn(from, edge), n) / dot(n, d);
+    // Widened edges meet far beyond the tip.
+    Real along = dot(d * s - from, edge) / longest, reach = slack / sqrt(longest);
+    Real3 weights = isA   ? Real3(s, Real(1.0) - along, along)
+                    : isB ? Real3(s, Real(0.0), Real(1.0) - along)
+                          : Real3(s, along, Real(0.0));
+    return along >= -reach && along <= Real(1.0) + reach ? weights : Real3(Real(1e30), Real(0.0), Real(0.0));
+}
+
 // Finds where the line q + s d (|d| about 1) meets triangle a b c, in page space: x = s, y and z the weights of
 // b and c; x = 1e30 where it does not. Vertices are taken relative to q, edges are widened by
 // `slack` cells, so that no ray slips between triangles that share an edge or an edge's point.
@@ -286,6 +306,7 @@ INLINE Real3 intersectTriangle(Real3 q, Real3 d, Real3 a, Real3 b, Real3 c, Real
     Real3 off = at - d * s;
     Real limit = (outside ? Real(4.0) : Real(40.0)) * slack;
     if (dot(off, off) <= limit * limit) return Real3(s, wb * scale, wc * scale);
+    if (nd * nd > (outside ? Real(0.25) : Real(0.01)) * dot(n, n)) return intersectNeedle(d, va, vb, vc, slack);
     return outside ? miss : intersectEdgeOn(d, va, vb, vc, Real(40.0) * slack);
 }
 

@@ -43,8 +43,10 @@ public:
         VCP_TRY(forEachTile(picture_.size, options, [&](glm::ivec2 corner) {
             TileHits hits;
             hits.corner = corner;
+            if (showsWork()) hits.work.emplace();
             tiles_.cast(hits);
             if (hits.any) drawTile(hits);
+            if (showsWork()) drawWork(hits);
         }));
         if (!averagesSky) return {};
         return forEachTile(picture_.size, options, [&](glm::ivec2 corner) { drawKeptTile(corner); });
@@ -61,6 +63,8 @@ private:
         return size_t(pixel.y / kTileHeight) * size_t(across) + size_t(pixel.x / kTileWidth);
     }
 
+    [[nodiscard]] bool showsWork() const { return !picture_.work.empty(); }
+
     template <class Visit>
     void forEachHit(const TileHits& hits, const Visit& visit) const {
         forEachPixel(picture_.size, hits.corner, [&](glm::ivec2 pixel, int i) {
@@ -72,7 +76,11 @@ private:
         TileSurface surface;
         findNormals(layer_.rays, hits, surface);
         alignas(32) uint32_t colours[kTilePixels];
-        if (frame_.shadingMode >= frame::kShadeSteps && frame_.shadingMode <= frame::kShadeError) {
+        if (showsWork()) {
+            std::fill_n(colours, kTilePixels, 0u);  // drawWork gives them
+            return put(hits, surface, colours);
+        }
+        if (frame_.shadingMode == frame::kShadeLevel || frame_.shadingMode == frame::kShadeError) {
             forEachHit(hits, [&](glm::ivec2, int i) { colours[i] = falseColour(hits, i); });
             return put(hits, surface, colours);
         }
@@ -91,6 +99,23 @@ private:
                 if (!hits.onCap[size_t(i)]) colours[i] = withLine(colours[i], tiles_.lineOf(hits, pixel, i));
             });
         put(hits, surface, colours);
+    }
+
+    /// Adds the work of a tile's rays to the picture's, and shows it of all rays that visited something.
+    void drawWork(const TileHits& hits) {
+        const TileWork& done = *hits.work;
+        const bool isSteps = frame_.shadingMode == frame::kShadeSteps,
+                   isCells = frame_.shadingMode == frame::kShadeCells;
+        const uint32_t* const shown = isSteps ? done.steps : isCells ? done.cells : done.fetches;
+        const float most = isSteps   ? frame::kMostShownSteps
+                           : isCells ? frame::kMostShownCells
+                                     : frame::kMostShownFetches;
+        forEachPixel(picture_.size, hits.corner, [&](glm::ivec2 pixel, int i) {
+            if (done.steps[i] == 0) return;
+            uint32_t& work = picture_.work[at(pixel)];
+            work += shown[i];
+            picture_.colours[at(pixel)] = packedColour(glm::vec4(f32::heat(float(work) / most), 1));
+        });
     }
 
     [[nodiscard]] uint32_t falseColour(const TileHits& hits, int i) const {

@@ -36,7 +36,8 @@ struct HostPicture {
     std::vector<float> depth;        ///< world units along the unit ray; infinite where nothing is hit
     std::vector<glm::vec3> normals;  ///< unit, world axes, towards the viewer; 0 where nothing is hit
     std::vector<HostHit> hits;
-    std::vector<uint32_t> iterations;                 ///< of rays in mesostructure; empty without surfaces
+    std::vector<uint32_t> work;        ///< what a false colour shows of each pixel's ray; empty: none is counted
+    std::vector<uint32_t> iterations;  ///< of rays in mesostructure; empty without surfaces
     uint64_t unresolvedRays = 0, farSurfaceHits = 0;  ///< in mesostructure (SurfaceWork)
 };
 
@@ -70,7 +71,8 @@ struct HostLayer {
     PictureMarks* marks = nullptr;  ///< where given, gets the pages that rays hit; one for each page of the scene
 };
 
-/// Draws a layer over what is in the picture. Precondition: frame.shadingMode is none of the counts of a ray's work.
+/// Draws a layer over what is in the picture. Where picture.work is as large as the picture, the work of the layer's
+/// rays is added to it, and pixels show it. Precondition: it is just where frame.shadingMode is a count of work.
 /// Errors: Cancelled, between tiles.
 Result<void> drawLayer(const HostLayer& layer, const HostCastOptions& options, HostPicture& picture);
 

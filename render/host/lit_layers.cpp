@@ -96,12 +96,14 @@ public:
 
     Result<void> draw(const HostCastOptions& options) {
         const bool averagesSky = frame_.occlusionRays > 0;
+        const bool showsIterations = frame_.shadingMode == frame::kShadeSteps && !surfaces_.empty();
         VCP_TRY(forEachTile(picture_.size, options, [&](glm::ivec2 corner) {
             for (const auto& each : lit_) castLayer(*each, corner);
             SurfaceWork work;
             std::vector<SurfaceCaster> casters;
             for (const HostSurface& surface : surfaces_) casters.emplace_back(surface);
             for (SurfaceCaster& caster : casters) castSurface(caster, corner, work);
+            if (showsIterations) showIterations(corner);
             const LitTile tile = hitsOf(corner);
             if (tile.count == 0) return;
             for (size_t k = 0; k < tile.count; ++k) planes_.sun[tile.pixels[k].at] = 255;
@@ -111,7 +113,7 @@ public:
             }
             if (averagesSky)
                 castSky(tile, casters, work);
-            else
+            else if (!showsIterations)
                 shade(corner, false);
             unresolvedRays_ += work.unresolvedRays, farHits_ += work.farHits;
         }));
@@ -282,6 +284,15 @@ private:
         castLightRays(each.layer.scene, {rays, directions.size()}, distances, each.tiles.lightMarks());
         for (size_t i = 0; i < directions.size(); ++i)
             near[i] = std::min(near[i], float(double(distances[i]) * each.cell));
+    }
+
+    /// Shows how long the rays of a tile marched, of those that hit nothing, too.
+    void showIterations(glm::ivec2 corner) {
+        forEachPixel(picture_.size, corner, [&](glm::ivec2 pixel, int) {
+            const uint32_t iterations = picture_.iterations[at(pixel)];
+            const float part = std::min(float(iterations) / frame::kMesoHottest, 1.0f);
+            if (iterations > 0) picture_.colours[at(pixel)] = packedColour(glm::vec4(f32::heat(part), 1));
+        });
     }
 
     void shade(glm::ivec2 corner, bool averagesSky) {

@@ -163,6 +163,10 @@ private:
     void keepTriangle(const WalkEntry& at, const Triangles&, int, const RayGroup&, Mask, const GroupInHardLeaf&) {
         keepLeaf(at);
     }
+    /// The work of rays of light is not counted.
+    static void countNode(glm::vec3, float) {}
+    static void count(uint32_t, uint32_t, uint32_t) {}
+    static void countUntil(int, Mask) {}
 
     const SunRays& sun_;
     PageMarks* const marks_;  // or null

@@ -22,6 +22,8 @@ public:
         hits_.leaves.clear();
         hits_.widestSlab = 0;
         walk();
+        if (hits_.work)
+            for (int i = 0; i < kGroups; ++i) countUntil(i, haveRays_ ? groups_[i].alive : hn::Not(maskOf(0)));
         hits_.any = !hits_.leaves.empty();
         if (hits_.any) writeHits();
     }
@@ -78,6 +80,31 @@ private:
         takeTriangle(triangles, t, group, taken, in);
     }
 
+    HWY_INLINE void countNode(glm::vec3 middle, float half) {
+        if (!hits_.work) return;
+        for (uint32_t groups = open_ & groupsMet(middle, half); groups != 0; groups &= groups - 1)
+            ++nodes_[std::countr_zero(groups)];
+    }
+    HWY_INLINE void count(uint32_t groups, uint32_t leaves, uint32_t reads) {
+        if (!hits_.work) return;
+        for (; groups != 0; groups &= groups - 1) {
+            leaves_[std::countr_zero(groups)] += leaves;
+            reads_[std::countr_zero(groups)] += reads;
+        }
+    }
+    HWY_INLINE void countUntil(int i, Mask rays) {
+        if (hits_.work) writeWork(i, bitsOf(rays));
+    }
+    HWY_NOINLINE void writeWork(int i, uint32_t rays) {
+        for (; rays != 0; rays &= rays - 1) {
+            const int lane = std::countr_zero(rays),
+                      at = firstOf(i) + lane / kGroupWidth * kTileWidth + lane % kGroupWidth;
+            hits_.work->steps[at] = nodes_[i];
+            hits_.work->cells[at] = leaves_[i];
+            hits_.work->fetches[at] = nodes_[i] + reads_[i];
+        }
+    }
+
     void writeHits() {
         const auto isOnTriangles = [](const RayGroup& group) HWY_ATTR { return any(group.onTriangle); };
         if (std::any_of(groups_, groups_ + kGroups, isOnTriangles)) normals_.find(scene_, hits_.leaves);
@@ -85,7 +112,7 @@ private:
         const Lane cell{float(scene_.grid().cell)}, rest{scene_.grid().cell - double(float(scene_.grid().cell))};
         for (int i = 0; i < kGroups; ++i) {
             const RayGroup& group = groups_[i];
-            const int at = i / kGroupColumns * kGroupHeight * kTileWidth + i % kGroupColumns * kGroupWidth;
+            const int at = firstOf(i);
             const Mask missed = group.t >= Lane(hwy::HighestValue<float>());
             const Lane depth = mulAdd(group.t, cell, group.t * mulAdd(cell, lengthAboveOne(group), rest));
             writeRows(select(missed, Lane(std::numeric_limits<float>::infinity()), depth), hits_.depth + at);
@@ -117,6 +144,11 @@ private:
         return square / (Lane(1.0f) + sqrt(Lane(1.0f) + square));
     }
 
+    /// Returns the element of a tile's arrays that a group's first ray has.
+    static int firstOf(int group) {
+        return group / kGroupColumns * kGroupHeight * kTileWidth + group % kGroupColumns * kGroupWidth;
+    }
+
     static void writeRows(Lane lanes, float* first) {
         alignas(32) float numbers[8];
         store(lanes, numbers);
@@ -126,6 +158,7 @@ private:
 
     TileHits& hits_;
     TriangleNormals normals_;
+    uint32_t nodes_[kGroups] = {}, leaves_[kGroups] = {}, reads_[kGroups] = {};  // of each group
 };
 
 }  // namespace vcp::HWY_NAMESPACE

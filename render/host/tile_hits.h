@@ -4,6 +4,7 @@
 #include <bitset>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <vector>
 
 #include <glm/vec2.hpp>
@@ -29,6 +30,13 @@ struct HitLeaf {
     uint32_t bits = 0;     ///< log2 of the leaf's edge in subcells; of these, too
 };
 
+/// The work of a tile's rays, which go in groups of 4 x 2 or 4 x 1 (ray_group-inl.h): what was done until each ended.
+struct TileWork {
+    uint32_t steps[kTilePixels];    ///< nodes visited that the ray's group may meet
+    uint32_t cells[kTilePixels];    ///< leaves that the group was cast at
+    uint32_t fetches[kTilePixels];  ///< steps, and reads of at most 16 bytes in those leaves
+};
+
 /// The first hits of a tile's rays. Element y * kTileWidth + x of an array belongs to pixel corner + (x, y); those
 /// outside of the picture say nothing.
 struct TileHits {
@@ -51,6 +59,7 @@ struct TileHits {
     float widestSlab = 0;              ///< edge of the largest slab leaf among them, finest cells
     std::bitset<kTilePixels> blended;  ///< where the normal and `colour` are blends of slabs (slab_blend.h)
     glm::vec4 colour[kTilePixels];     ///< undefined elsewhere
+    std::optional<TileWork> work;      ///< where there is one, it is filled, for rays that hit nothing, too
 };
 
 }  // namespace vcp

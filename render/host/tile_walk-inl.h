@@ -19,7 +19,8 @@ constexpr uint32_t kAllGroups = uint32_t((uint64_t{1} << kGroups) - 1);
 
 /// `Tile`: has groupsMet(middle, half), the groups with rays that may meet a box (arguments as those of childrenMet);
 /// makeGroups(), which fills groups_ before the first leaf; keepLeaf(at), for a leaf that rays hit, which gives its
-/// number; and keepTriangle(...), for a triangle that rays hit.
+/// number; keepTriangle(...), for a triangle that rays hit; countNode(middle, half), count(groups, leaves, reads) and
+/// countUntil(i, rays), for the boxes of nodes, what groups are cast at, and rays of a group that have hit.
 template <class Tile>
 class TileWalk {
 protected:
@@ -44,6 +45,7 @@ private:
     HWY_INLINE void visitNode(const WalkEntry& at) {
         const double half = 0.5 * cellsOf(at.bits);
         const glm::dvec3 middle = glm::dvec3(at.corner) * kSubcell + half - rays_.origin;
+        tile().countNode(glm::vec3(middle), float(half));
         uint32_t nearest = nearOctant_;
         if (!rays_.isParallel)
             nearest = uint32_t(middle.x < 0) | uint32_t(middle.y < 0) << 1 | uint32_t(middle.z < 0) << 2;
@@ -119,10 +121,12 @@ private:
         if (nodeType(at.word) == kNodeHard) return castHard<kIsCut>(at, leaf, groups);
         const PageView& view = *scene_.page(at.page).view;
         if (nodeType(at.word) == kNodeSlab) {
+            tile().count(groups, 1, 1);
             const SlabLeaf slab = decodeSlabLeaf(view, at.word);
             return castGroups(at, groups,
                               [&](RayGroup& group) HWY_ATTR { return castSlabLeaf<kIsCut>(slab, leaf, group); });
         }
+        tile().count(groups, 1, 2);
         const SoftLeaf soft = decodeSoftLeaf(view, at.word);
         castGroups(at, groups, [&](RayGroup& group) HWY_ATTR { return castSoftLeaf<kIsCut>(soft, leaf, group); });
     }
@@ -147,6 +151,7 @@ private:
         RayGroup& group = groups_[i];
         group.leaf = hn::IfThenElse(hn::RebindMask(Words(), hit), leaf, group.leaf);
         group.alive = without(group.alive, hit);
+        tile().countUntil(i, hit);
         if (!any(group.alive)) open_ &= ~(1u << i);
     }
 
@@ -161,6 +166,7 @@ private:
             if (any(inLeaf_[i].inside)) active |= 1u << i;
         }
         if (active == 0) return;
+        tile().count(active, 1, 0);
         // An eighth of the page's cell is so many of its lattice's steps.
         constexpr int kSteps = kLatticePerCell >> kMaxSubcellDepth;
         const glm::uvec3 inPage = (at.corner - page.corner) >> page.cellBits;
@@ -168,6 +174,7 @@ private:
         Triangles triangles;
         for (StripWalk walk(page.view->strips, at.word); nextTriangles(walk, triangles);) {
             setUpTriangles(*page.view, hard, triangles);
+            tile().count(active, 0, uint32_t(triangles.count) * kTriangleReads);
             for (uint32_t rest = active; rest != 0; rest &= rest - 1)
                 castAtTriangles(at, hard, triangles, std::countr_zero(rest));
         }
@@ -198,6 +205,8 @@ private:
     Tile& tile() { return static_cast<Tile&>(*this); }
 
 protected:
+    static constexpr uint32_t kTriangleReads = 4;  // an entry of its strip, and vertices
+
     const HostScene& scene_;
     SceneWalk walk_;
     const TileRays& rays_;

@@ -5,8 +5,3 @@ void countHit(bool found) {
     uint hitCount = subgroupBallotBitCount(subgroupBallot(found));
     if (subgroupElect()) atomicAdd(counters.hitPixels, hitCount);
 }
-
-void countWork(uint steps, uint fetches) {
-    atomicAdd(counters.steps, steps);
-    atomicAdd(counters.fetches, fetches);
-}

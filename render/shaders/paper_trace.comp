@@ -52,5 +52,4 @@ void main() {
     if (kFalseColour != 0u) storeHit(frame.lightPlane * plane + at, floatBitsToUint(falseColour(hit, work, page)));
 
     countHit(found);
-    if (kCountSteps != 0u) countWork(work.steps, work.fetches);
 }

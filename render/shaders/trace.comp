@@ -264,5 +264,4 @@ void main() {
 
     storeHitPage(hit.record, found);
     countHit(found);
-    if (kCountSteps != 0u) countWork(work.steps, work.steps + work.fetches);
 }

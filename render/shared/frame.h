@@ -20,7 +20,7 @@ using uvec4 = glm::uvec4;
 static_assert(sizeof(FrameConstants) == 608 && offsetof(FrameConstants, originLattice) == 96);
 static_assert(offsetof(FrameConstants, width) == 128 && offsetof(FrameConstants, clay) == 192);
 static_assert(offsetof(FrameConstants, pixelEdge) == 224 && offsetof(FrameConstants, paperEpsilon) == 256);
-static_assert(sizeof(FrameCounters) == 16 && sizeof(SceneRay) == 16 && sizeof(TableRecord) == 16 * kRecordTexels);
+static_assert(sizeof(FrameCounters) == 4 && sizeof(SceneRay) == 16 && sizeof(TableRecord) == 16 * kRecordTexels);
 
 /// Tells whether two records have the same bytes.
 inline bool operator==(const TableRecord& a, const TableRecord& b) { return std::memcmp(&a, &b, sizeof(a)) == 0; }

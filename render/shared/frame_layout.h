@@ -160,7 +160,4 @@ const uint kScenePlanes = 4u;
 
 struct FrameCounters {
     uint hitPixels;
-    uint tracedTiles;
-    uint steps;
-    uint fetches;
 };

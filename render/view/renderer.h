@@ -140,9 +140,7 @@ public:
     Result<Picture> readPicture() override;
     Result<std::vector<float>> readDepth() override;
     Result<std::vector<glm::vec3>> readNormals() override;
-    /// Returns the number behind the false colour of each pixel: steps, cells or fetches of its ray. Precondition: the
-    /// last render() was shaded so.
-    Result<std::vector<uint32_t>> readWork();
+    Result<std::vector<uint32_t>> readWork() override;
     Result<std::vector<uint32_t>> readIterations() override;
     /// Returns what one pixel of the last render() shows; nothing where the ray hit nothing or the pixel is outside.
     Result<std::optional<PixelHit>> pick(uint32_t x, uint32_t y);

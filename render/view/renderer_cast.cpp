@@ -18,8 +18,8 @@ void copyInto(const Buffer& buffer, std::span<const uint32_t> colours) {
 
 }  // namespace
 
-bool Renderer::View::isCastOnHost(const FrameRequest& request) const {
-    if (!shared->options.hostRays || !shared->info.software || !checkHostDraws(request)) return false;
+bool Renderer::View::isCastOnHost() const {
+    if (!shared->options.hostRays || !shared->info.software) return false;
     if (shared->meso && shared->preparedSurfaces().empty()) return false;
     return std::all_of(layers.begin(), layers.end(), [](const Layer& layer) {
         if (layer.residency == nullptr) return true;
@@ -70,7 +70,7 @@ Result<uint32_t> Renderer::View::castPart() {
     Frame& shown = frames[*drawn];
     CastPicture& cast = *shown.cast;
     const std::vector<HostDataset> datasets = hostDatasets();
-    if (cutNumbers(datasets) != cast.cuts || !isCastOnHost(shown.request)) return 0u;
+    if (cutNumbers(datasets) != cast.cuts || !isCastOnHost()) return 0u;
     FrameRequest request = shown.request;
     request.sample = samples;
     const PicturePart part = picturePart(request, nextPart, raysPerPixel(request, shared->meso != nullptr));

@@ -43,7 +43,7 @@ PassConstants Renderer::View::constantsFor(const Layer& layer, const FrameReques
         c.seams = residency->dataset().header.levels > 1 && !residency->dataset().isCovering();
     }
     c.falseColour = hasHitNumbers(request.shading.mode);
-    c.countSteps = request.countSteps || showsWork(request.shading.mode);
+    c.countSteps = showsWork(request.shading.mode);
     return c;
 }
 
@@ -300,7 +300,7 @@ Result<FrameStats> Renderer::View::draw(const FrameRequest& request, const std::
     VCP_TRY(checkRequest(request));
     const DeviceWork before = shared->device->work();
     VCP_TRY(takeInAll());
-    if (isCastOnHost(request)) {
+    if (isCastOnHost()) {
         VCP_TRY(cast(0, request, {}, cancel));
     } else {
         VCP_TRY(submit(0, request, {}, false));
@@ -329,7 +329,7 @@ Result<void> Renderer::View::drawAhead(const FrameRequest& request, const std::o
     const std::optional<PicturePixel> inside = isInside ? cursor : std::nullopt;
     // What takes long is drawn step by step, which the device's passes can.
     const bool isLong = request.shading.occlusionRays > 0 && raysOf(request) > kMostRaysAtOnce;
-    VCP_TRY(!isLong && isCastOnHost(request) ? cast(next, request, inside, {}) : submit(next, request, inside, true));
+    VCP_TRY(!isLong && isCastOnHost() ? cast(next, request, inside, {}) : submit(next, request, inside, true));
     frame.isAhead = true;
     frame.stats.submissions = shared->device->work().submissions - work.submissions;
     frame.stats.hostWaits = shared->device->work().waits - work.waits;
@@ -609,8 +609,6 @@ Result<void> Renderer::View::addStats(const Frame& frame, size_t i, FrameStats& 
     const FrameCounts counts = layer.resources->counts();
     all.hitPixels += counts.counters.hitPixels;
     all.tracedRays += std::min<uint64_t>(all.rays, uint64_t{counts.listedTiles} * frame::kTileSize * frame::kTileSize);
-    all.steps += counts.counters.steps;
-    all.fetches += counts.counters.fetches;
     VCP_TRY_ASSIGN(const auto ms, layer.timer.read());
     all.msBeam += ms[0];
     all.msTrace += ms[1];

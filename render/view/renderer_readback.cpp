@@ -103,8 +103,8 @@ Result<std::vector<float>> Renderer::View::depthOf(const Frame& frame, size_t la
 
 Result<std::vector<uint32_t>> Renderer::readWork() {
     const auto frame = view_->lastFrame();
-    if (!frame || !showsWork((*frame)->request.shading.mode))
-        return Error{.code = ErrorCode::Usage, .message = "the last picture does not show work"};
+    if (!frame || !showsWork((*frame)->request.shading.mode)) return kNoWorkShown;
+    if ((*frame)->cast) return (*frame)->cast->picture.work;
     const ShadingMode mode = (*frame)->request.shading.mode;
     const auto most = float(falseColourEnd(mode));
     std::vector<uint32_t> work;

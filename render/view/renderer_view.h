@@ -190,8 +190,8 @@ struct Renderer::View {
     Result<void> drawAhead(const FrameRequest& request, const std::optional<PicturePixel>& cursor);
     /// Draws the next part of a further sample; as Renderer::refineAhead().
     Result<uint32_t> drawPart();
-    /// Whether the processor casts the rays of such a picture now, in place of the device.
-    [[nodiscard]] bool isCastOnHost(const FrameRequest& request) const;
+    /// Whether the processor casts rays now, in place of the device.
+    [[nodiscard]] bool isCastOnHost() const;
     /// Draws a frame by the processor, and takes it in. Precondition: isCastOnHost(), and nothing in flight uses it.
     Result<void> cast(size_t number, const FrameRequest& request, const std::optional<PicturePixel>& cursor,
                       const std::function<bool()>& cancel);
@@ -271,10 +271,5 @@ struct Renderer::View {
 
 /// What a pixel costs, in rays through pages.
 uint32_t raysPerPixel(const FrameRequest& request, bool hasSurfaces);
-
-/// Whether pixels show the work of their rays.
-constexpr bool showsWork(ShadingMode mode) {
-    return mode == ShadingMode::Steps || mode == ShadingMode::Cells || mode == ShadingMode::Fetches;
-}
 
 }  // namespace vcp

@@ -353,6 +353,13 @@ TEST(Stability, GrazingRaysAlongALongWall) {
     expectRight(mesh, 0.1, 3000);
 }
 
+TEST(Stability, WallsThinnerThanACell) {
+    // A thousand cells long: one triangle in each face, so that the narrow faces are needles.
+    IndexedMesh mesh = test::boxMesh({0, 0, 0}, {100, 0.05, 3}, 1);
+    test::rotate(mesh, {0, 0, 0}, {1, 2, 3}, 0.2);
+    expectRight(Built(mesh, 0.1), 60000, ~0u);
+}
+
 TEST(Stability, RandomSoup) {
     for (uint64_t seed = 0; seed < 3; ++seed) {
         // Coarser levels merge triangles that lie apart: the finest only.

@@ -176,16 +176,19 @@ TEST_F(RendererTest, PipelinesAreMadeOnceAndOnlyWhenNeeded) {
     show(scene);
     FrameRequest request = requestOf(cameras(scene)[0].camera);
     EXPECT_EQ(draw(request).pipelines, 3u);
-    const FrameStats plain = draw(request);
-    EXPECT_EQ(plain.pipelines, 3u);
-    EXPECT_EQ(plain.steps, 0u);
-    request.countSteps = true;
-    const FrameStats counted = draw(request);
-    EXPECT_EQ(counted.pipelines, 4u);
-    EXPECT_GT(counted.steps, counted.hitPixels);
-    EXPECT_GT(counted.fetches, counted.steps);
-    EXPECT_LT(counted.steps, 60 * counted.tracedRays);
-    EXPECT_EQ(draw(request).steps, counted.steps) << "exact";
+    EXPECT_EQ(draw(request).pipelines, 3u);
+    const auto workOf = [&](ShadingMode mode) {
+        request.shading.mode = mode;
+        const FrameStats stats = draw(request);
+        EXPECT_EQ(stats.pipelines, 5u) << "rays that count, and their colours";
+        const std::vector<uint32_t> work = renderer_->readWork().value();
+        return std::pair(std::accumulate(work.begin(), work.end(), uint64_t{0}), stats);
+    };
+    const auto [steps, counted] = workOf(ShadingMode::Steps);
+    EXPECT_GT(steps, counted.hitPixels);
+    EXPECT_LT(steps, 60 * counted.tracedRays);
+    EXPECT_GT(workOf(ShadingMode::Fetches).first, steps);
+    EXPECT_EQ(workOf(ShadingMode::Steps).first, steps) << "exact";
 }
 
 TEST_F(RendererTest, OnlyFramesThatMissPagesAskRaysWhatToRead) {

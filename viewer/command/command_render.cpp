@@ -8,7 +8,6 @@
 
 #include "mesostructure/base/subdivision.h"
 #include "render/false_colours.h"
-#include "render/host_renderer.h"
 #include "viewer/annotation/picture_canvas.h"
 #include "viewer/camera/camera_path.h"
 #include "viewer/command/build_arguments.h"
@@ -163,13 +162,6 @@ FrameRequest requestFor(const RenderCommand& command, const OpenedScene& open, c
     return request;
 }
 
-/// Refuses what the host does not draw before a mesh is built for it.
-Result<void> checkHost(const RenderCommand& command) {
-    FrameRequest request;
-    request.shading = command.render.shading;
-    return checkHostDraws(request);
-}
-
 /// Draws all inputs together, into one picture or a sequence. Returns its figures, for --json.
 Result<Json> render(const RenderCommand& command) {
     VCP_TRY_ASSIGN(auto open,
@@ -254,7 +246,6 @@ Result<int> run(RenderCommand command) {
         VCP_TRY_ASSIGN(commands, oneByOne(command));
     }
     for (const RenderCommand& each : commands) VCP_TRY(checkOptions(each));
-    if (isHostName(command.render.device)) VCP_TRY(checkHost(command));
     if (isForEach) VCP_TRY(prepareOutputs(commands));
     for (const RenderCommand& each : commands) VCP_TRY(checkOutputs(each, rulesOf(command, {}), 1));
     Json pictures = Json::array();

@@ -3,6 +3,7 @@
 #include <atomic>
 #include <fstream>
 
+#include "render/false_colours.h"
 #include "tests/support/host_comparison.h"
 
 namespace vcp {
@@ -39,6 +40,15 @@ protected:
         return all;
     }
 };
+
+/// Expects the colours of the numbers where rays visited something.
+void expectColoursOf(const Picture& picture, const std::vector<uint32_t>& work, double end) {
+    for (size_t i = 0; i < work.size(); ++i) {
+        if (work[i] == 0) continue;
+        const glm::vec3 colour = 255.0f * falseColour(work[i] / end);
+        for (int c = 0; c < 3; ++c) ASSERT_NEAR(double(picture.rgba[4 * i + size_t(c)]), double(colour[c]), 0.51) << i;
+    }
+}
 
 constexpr ShadingMode kModes[] = {ShadingMode::Lit,     ShadingMode::Clay,  ShadingMode::Unlit,
                                   ShadingMode::Normals, ShadingMode::Level, ShadingMode::Error};
@@ -102,17 +112,67 @@ TEST_F(CastByRendererTest, PicksWhatTheDevicePicks) {
 }
 
 TEST_F(CastByRendererTest, WhatTheHostDoesNotDrawTheDeviceDraws) {
+    const Scene seams = test::sphereScene(2);
+    const std::vector<PlacedDataset> datasets{{seams.dataset, seams.source, {}}};
+    ASSERT_TRUE(renderer_->open(datasets));
+    ASSERT_TRUE(casting_->open(datasets));
+    const FrameRequest request = requestOf(test::cameras(seams)[0].camera);
+    EXPECT_EQ(drawnBy(*casting_, request).picture, drawnBy(*renderer_, request).picture);
+    EXPECT_FALSE(casting_->render(request)->onHost);
+    // And back again, dataset by dataset.
     const test::BuiltMesh built = torusAndBox();
-    ASSERT_TRUE(built.ok());
+    openAll({placed(built.file())});
+    const FrameRequest other = requestOf(test::cameras(kLow, kHigh)[0].camera);
+    EXPECT_EQ(drawnBy(*casting_, other).picture, drawnBy(*host_, other).picture);
+    EXPECT_TRUE(casting_->render(other)->onHost);
+}
+
+TEST_F(CastByRendererTest, CountsTheWorkOfTheHostsRays) {
+    const test::BuiltMesh built = torusAndBox();
     openAll({placed(built.file())});
     FrameRequest request = requestOf(test::cameras(kLow, kHigh)[0].camera);
-    request.shading.mode = ShadingMode::Steps;
-    const Planes device = drawnBy(*renderer_, request), counted = drawnBy(*casting_, request);
-    EXPECT_EQ(counted.picture, device.picture);
-    EXPECT_FALSE(casting_->render(request)->onHost);
-    // And back again, frame by frame.
-    request.shading.mode = ShadingMode::Lit;
+    drawnBy(*host_, request), drawnBy(*casting_, request);
+    EXPECT_EQ(host_->readWork().error().code, ErrorCode::Usage);
+    EXPECT_EQ(casting_->readWork().error().code, ErrorCode::Usage);
+    request.shading.mode = ShadingMode::Fetches;
     EXPECT_EQ(drawnBy(*casting_, request).picture, drawnBy(*host_, request).picture);
+    EXPECT_EQ(casting_->readWork().value(), host_->readWork().value());
+}
+
+// A ray of the shaders meets what its group of the host's meets, or less.
+TEST_F(HostRendererTest, WorkIsThatOfGroupsOfRays) {
+    const test::BuiltMesh built = torusAndBox();
+    ASSERT_TRUE(built.ok());
+    open(built);
+    for (const NamedCamera& named : test::cameras(kLow, kHigh)) {
+        SCOPED_TRACE(named.name);
+        FrameRequest request = requestOf(named.camera);
+        const Planes lit = drawnBy(*host_, request);
+        std::vector<uint32_t> work[3], ofShaders;
+        for (int i = 0; i < 3; ++i) {
+            request.shading.mode = std::array{ShadingMode::Steps, ShadingMode::Cells, ShadingMode::Fetches}[size_t(i)];
+            const Planes counted = drawnBy(*host_, request);
+            work[i] = host_->readWork().value();
+            EXPECT_EQ(counted.depth, lit.depth);
+            EXPECT_EQ(counted.normals, lit.normals);
+            expectColoursOf(counted.picture, work[i], falseColourEnd(request.shading.mode));
+        }
+        request.shading.mode = ShadingMode::Cells;
+        drawnBy(*renderer_, request);
+        ofShaders = renderer_->readWork().value();
+        uint64_t fewer = 0, sum = 0, sumOfShaders = 0, hits = 0;
+        for (size_t i = 0; i < lit.depth.size(); ++i) {
+            const auto [steps, cells, fetches] = std::array{work[0][i], work[1][i], work[2][i]};
+            EXPECT_GE(fetches, steps + cells);
+            if (!std::isfinite(lit.depth[i])) continue;
+            EXPECT_GT(steps, 3u);
+            EXPECT_GT(cells, 0u);
+            fewer += cells < ofShaders[i] ? 1 : 0;
+            sum += cells, sumOfShaders += ofShaders[i], ++hits;
+        }
+        EXPECT_LE(double(fewer), 1e-3 * double(hits)) << "rays that pass the edges of leaves";
+        EXPECT_LT(double(sum), 8.0 * double(sumOfShaders));
+    }
 }
 
 TEST_F(CastByRendererTest, CancellingEndsAFrame) {
@@ -381,17 +441,6 @@ TEST_F(HostRendererTest, RefusesWhatItDoesNotDraw) {
     const Scene scene = test::sphereScene(1), seams = test::sphereScene(2);
     EXPECT_EQ(host_->open({{seams.dataset, seams.source, {}}}, {}).error().code, ErrorCode::Unsupported);
     open(scene);
-    const FrameRequest request = requestOf(test::cameras(scene)[0].camera);
-    const auto refused = [&](const FrameRequest& asked) {
-        const auto update = host_->update(asked);
-        return !update && update.error().code == ErrorCode::Unsupported && !host_->render(asked);
-    };
-    FrameRequest asked = request;
-    for (const ShadingMode mode : {ShadingMode::Steps, ShadingMode::Cells, ShadingMode::Fetches}) {
-        asked = request;
-        asked.shading.mode = mode;
-        EXPECT_TRUE(refused(asked));
-    }
     const std::vector<MesoSurface> surfaces(1);  // without arrays, as those that are remeshed
     EXPECT_EQ(host_->setSurfaces(surfaces).error().code, ErrorCode::Unsupported);
     EXPECT_FALSE(host_->open({{scene.dataset, scene.source, {}}}, surfaces));

@@ -163,7 +163,7 @@ TEST_F(HostSurfaces, ModesSectionsLightsTexturesAndFar) {
         expectAlike(all);
     };
     for (const ShadingMode mode : {ShadingMode::Lit, ShadingMode::Clay, ShadingMode::Unlit, ShadingMode::Normals,
-                                   ShadingMode::Level, ShadingMode::Error})
+                                   ShadingMode::Level, ShadingMode::Error, ShadingMode::Steps})
         for (const bool shadows : {false, true}) {
             SCOPED_TRACE(testing::Message() << int(mode) << shadows);
             compared([&](FrameRequest& request) { request.shading.mode = mode, request.shading.shadows = shadows; });

@@ -600,11 +600,6 @@ TEST_F(CommandLine, TheHostSaysWhatItDoesNotDraw) {
         arguments.insert(arguments.end(), more.begin(), more.end());
         return run(arguments);
     };
-    expectFailure(refused({"--shading", "steps"}), 1, "--device");
-    const fs::path cache = *folder_ / "cache";
-    fs::remove_all(cache);
-    expectFailure(run({"render", ball().string(), "-o", out, "--device", "host", "--shading", "cells"}), 1, "work");
-    EXPECT_FALSE(fs::exists(cache)) << "nothing was built first";
     expectFailure(refused({"--validation"}), 1, "validation layers");
     expectFailure(run({"view", dataset().string(), "--device", "host"}), 2, "the host draws no window");
     const fs::path soft = *folder_ / "soft.vcp";

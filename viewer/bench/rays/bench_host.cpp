@@ -60,6 +60,7 @@ public:
         }
         TracedPicture picture;
         picture.seconds = upperQuantile(seconds, 0.5);
+        VCP_TRY(countWork(scene, rays, picture.work));
         picture.hits.resize(pixels.size());
         for (size_t i = 0; i < pixels.size(); ++i) {
             if (std::isinf(pixels[i].t)) continue;
@@ -73,6 +74,19 @@ public:
     }
 
 private:
+    /// Counts the work of each ray; of what is timed, nothing is counted.
+    static Result<void> countWork(const HostScene& scene, const PictureRays& rays, RaysWork& work) {
+        return forEachTile(rays.size, {.threads = 1}, [&](glm::ivec2 corner) {
+            TileHits hits;
+            hits.corner = corner;
+            TileWork& done = hits.work.emplace();
+            castTile(scene, rays, hits);
+            for (int y = 0; y < hits.size.y; ++y)
+                for (int i = y * kTileWidth; i < y * kTileWidth + hits.size.x; ++i)
+                    work.add(done.steps[i], done.cells[i], done.fetches[i]);
+        });
+    }
+
     /// Returns the bytes of a scene's pages; the octants of one follow each other.
     [[nodiscard]] uint64_t bytesOf(const HostScene& scene) const {
         uint64_t bytes = 0, last = UINT64_MAX;

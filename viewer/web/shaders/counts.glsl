@@ -1,5 +1,3 @@
 // Browsers count no work.
 
 void countHit(bool found) {}
-
-void countWork(uint steps, uint fetches) {}

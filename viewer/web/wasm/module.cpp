@@ -184,7 +184,6 @@ void awaitImages(UpdateResult& update) {
 
 Result<UpdateResult> update() {
     VCP_TRY(checkRequest(opened.request));
-    VCP_TRY(checkHostDraws(opened.request));
     jpegTiles().beginWalk();
     const ShownResidency shown{&residency(), {}, &opened.errorPixels};
     VCP_TRY_ASSIGN(auto update, updateShown({&shown, 1}, opened.request));

@@ -305,6 +305,7 @@ TEST_F(BenchRays, TheHostHitsWhatTheReferenceHits) {
     for (const Json& row : report["rows"]) {
         EXPECT_EQ(row["holes"], 0) << row;
         EXPECT_EQ(row["beyond_certified"], 0) << row;
+        expectRow(row);
         rows[row["method"].get<std::string>() + row["camera"].get<std::string>()] = row;
     }
     for (const std::string camera : {"close", "lattice", "grazing"})
