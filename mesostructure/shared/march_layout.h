@@ -62,10 +62,10 @@ struct MesoRecord {
     uint data;                             // word of texels, samples or ranks
     uint rows;                             // word of the rows
     uint patches;                          // first quad of the patches
-    float step;       // tile units of a step of a height or (sphere, displacement maps) of a distance
-    float height;     // of the slab, tile units
-    float tolerance;  // (relief)
-    float unused0;
+    float step;         // tile units of a step of a height or (sphere, displacement maps) of a distance
+    float height;       // of the slab, tile units
+    float tolerance;    // (relief)
+    uint patchNormals;  // first quad of the patches' normals; 0: there are none
     MesoLevel levels[kMesoMaxLevels];
     MesoBorder borders[kMesoMostBorders];
 };
