@@ -203,6 +203,17 @@ MarchArrays reliefArrays(const HeightMap& map, const ReliefOptions& options) {
     return arrays;
 }
 
+MarchArrays layeredArrays(const ReliefLayers& layers, const ReliefOptions& options) {
+    MarchArrays arrays = steppedArrays(layers.extent, options);
+    arrays.constants.surface = kMesoLayers;
+    arrays.record.fine = {layers.size, 1};
+    arrays.record.height = float(layers.extent.z);
+    arrays.record.levelCount = layers.layers;
+    arrays.record.data = add(layers.bounds, arrays.words);
+    align(arrays.words);
+    return arrays;
+}
+
 MarchArrays pyramidArrays(const HeightMap& map) {
     MarchArrays arrays;
     arrays.constants.walk = kMesoPyramid;

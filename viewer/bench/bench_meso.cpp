@@ -174,6 +174,12 @@ std::vector<Entry> entries() {
     // The two pictures that Risser et al. print side by side.
     for (const char* name : {"relief-binary", "relief-secant", "relief-illinois"})
         all.push_back({"steps 5 refinements 2", false, {.name = name, .steps = 5, .refinements = 2, .tolerance = 0}});
+    for (const int steps : {32, 64, 128, 256})
+        for (const int layers : {4, 8})
+            for (const float tolerance : {0.01f, 0.0f})
+                all.push_back({fmt::format("steps {} layers {}{}", steps, layers, tolerance == 0 ? " tolerance 0" : ""),
+                               steps == 32 && layers == 4 && tolerance > 0,
+                               {.name = "relief-layers", .steps = steps, .tolerance = tolerance, .layers = layers}});
     all.push_back({"exact", true, {.name = "pyramid"}});
     for (const char* name : {"sphere", "dm"})
         for (const int cells : {32, 64, 128})
