@@ -406,8 +406,10 @@ Result<BenchMesoReport> benchMeso(const BenchMesoOptions& options) {
     if (options.prisms) report.prisms = compareMesoPrisms(uint64_t(options.rays));
     std::vector<MesoPublished> ofModels;
     if (options.models) {
-        VCP_TRY_ASSIGN(report.models, compareMesoModels(options.device.value_or(kHostName), options.repetitions,
-                                                        ofModels, options.progress));
+        VCP_TRY_ASSIGN(report.models, compareMesoModels({.device = options.device.value_or(kHostName),
+                                                         .repetitions = options.repetitions,
+                                                         .progress = options.progress},
+                                                        ofModels));
     }
     for (size_t a = 0; a < assets.size(); ++a) {
         const auto told = [&](const std::string& what) {

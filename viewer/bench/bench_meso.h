@@ -225,12 +225,20 @@ inline double processorNs() { return double(std::clock()) * 1e9 / CLOCKS_PER_SEC
 /// Measures what maps of prisms distort, on tori of several curvatures and numbers of triangles.
 std::vector<MesoPrisms> compareMesoPrisms(uint64_t rays);
 
+struct MesoModelOptions {
+    std::string device;                 ///< as RendererOptions::device
+    int repetitions = 3;                ///< rounds over the models
+    uint32_t across = 640, down = 480;  ///< pixels of a picture
+    int cells = 0;                      ///< along x, of all methods and of transfer; 0: as printed, or their own
+    uint32_t paths = 256;               ///< a cell of transfer
+    /// Called with what is being done; false cancels. May be empty.
+    std::function<bool(const std::string& what, double part)> progress = {};
+};
+
 /// Times frames of the six models that Wang et al. 2004 print rates of, in rounds over all of them, and adds the ratios
-/// beside the printed ones. `device`: as RendererOptions::device; `progress` may be empty; false cancels. Errors: those
-/// of the renderer and of traceTransfer; Cancelled.
-Result<std::vector<MesoModel>> compareMesoModels(
-    const std::string& device, int repetitions, std::vector<MesoPublished>& published,
-    const std::function<bool(const std::string& what, double part)>& progress);
+/// beside the printed ones. Errors: those of the renderer and of traceTransfer; Cancelled.
+Result<std::vector<MesoModel>> compareMesoModels(const MesoModelOptions& options,
+                                                 std::vector<MesoPublished>& published);
 
 /// Judges the rays whose truth is known; `texel` in tile units.
 MesoJudged judgeMeso(const std::vector<meso::MarchResult>& results, const std::vector<meso::TruthHit>& truths,
