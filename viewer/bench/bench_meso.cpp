@@ -130,7 +130,10 @@ void addDisplacementMaps(std::vector<Entry>& all) {
         all.push_back(
             {"rank 16 grid 32 directions 8x16", false, {.name = name, .cells = 32, .rank = 16, .directions = {8, 16}}});
         all.push_back({"rank 16 grid 16", false, {.name = name, .cells = 16, .rank = 16}});
-        if (!isOfTop) continue;
+        if (!isOfTop) {
+            all.push_back({"table 16 bits grid 64", false, {.name = name, .cells = 64, .rank = 0}});
+            continue;
+        }
         for (const int cells : {64, 128, 256}) {
             all.push_back({fmt::format("rank 16 grid {}", cells), false, {.name = name, .cells = cells, .rank = 16}});
             all.push_back(
@@ -422,6 +425,12 @@ Result<BenchMesoReport> benchMeso(const BenchMesoOptions& options) {
             if (!told("factors")) return Error::cancelled();
             VCP_TRY_ASSIGN(const auto factors, compareMesoFactors(subject->asset, *subject->shape));
             report.factors.insert(report.factors.end(), factors.begin(), factors.end());
+        }
+        if (options.shadows) {
+            VCP_TRY_ASSIGN(const auto shadows,
+                           compareMesoShadows(subject->asset, *subject->shape, uint64_t(options.rays),
+                                              [&](double) { return told("shadows"); }));
+            report.shadows.insert(report.shadows.end(), shadows.begin(), shadows.end());
         }
         if (options.light) {
             const auto lit = [&](double part) {
