@@ -140,7 +140,7 @@ void readGuesses(In& in, SafeFactors& f) {
     for (size_t row = 0; row < f.rowCount(); ++row) in.require(f.rows[4 * row + 3] >> 16 < uint32_t(f.clusters));
 }
 
-constexpr uint32_t kTransferVersion = 1;
+constexpr uint32_t kTransferVersion = 1, kNormalsVersion = 1;
 
 void writeTransfer(const TransferVolume& volume, Out& o) {
     o.grid(volume.grid), o.one(volume.albedo), o.one(volume.paths), o.one(uint32_t(volume.cells())),
@@ -200,6 +200,10 @@ std::vector<std::pair<ChunkKind, Bytes>> chunksOf(const Asset& a) {
             o.grid(p.grid), o.one(uint32_t(p.ranks.size())), o.one(uint32_t(p.rows.size())),
                 o.one(uint32_t(p.patches.size())), o.one(p.cellsWithout);
             o.all(p.ranks), o.all(p.rows), o.all(p.patches);
+        });
+    if (a.patches && !a.patches->normals.empty())
+        add(ChunkKind::Normals, [&](Out& o) {
+            o.one(kNormalsVersion), o.one(uint32_t(a.patches->normals.size())), o.all(a.patches->normals);
         });
     if (a.gdm) add(ChunkKind::Displacement, [&](Out& o) { writeMap(*a.gdm, o); });
     if (a.guesses)
@@ -303,6 +307,12 @@ bool readChunk(ChunkKind kind, In& in, Asset& a) {
             a.patches->ranks = in.all<PatchSet::Rank>(ranks), a.patches->rows = in.all<uint32_t>(rows),
             a.patches->patches = in.all<Patch>(patches);
             in.require(in.ok() && arePatchesSound(*a.patches));
+            break;
+        }
+        case ChunkKind::Normals: {
+            const auto version = in.one<uint32_t>(), count = in.one<uint32_t>();
+            in.require(version == kNormalsVersion && a.patches && count == a.patches->patches.size());
+            if (in.ok()) a.patches->normals = in.all<PatchNormals>(count);
             break;
         }
         case ChunkKind::Displacement:
@@ -526,7 +536,7 @@ Result<Asset> parseAsset(std::span<const std::byte> bytes, const std::string& na
         if (hashBytes(content) != chunk.hash)
             return fail("chunk", chunk.offset, "hash does not match: the file was changed or damaged");
         const auto kind = uint32_t(chunk.kind);
-        if (kind >= 64 || kind == 0 || kind > uint32_t(ChunkKind::Transfer))
+        if (kind >= 64 || kind == 0 || kind > uint32_t(ChunkKind::Normals))
             return Error{.code = ErrorCode::Unsupported,
                          .message = fmt::format("chunk kind {} is not known: use a newer program", kind),
                          .file = name,

@@ -46,6 +46,8 @@ enum class ChunkKind : uint32_t {
     /// TransferVolume: grid, f32 albedo, u32 paths a cell, u32 number of the last cell, u32 version (1); u32 numbers,
     /// terms of 4 x u16
     Transfer = 12,
+    /// PatchSet::normals, behind the patches: u32 version (1), u32 number of patches, 4 x u32 a patch
+    Normals = 13,
 };
 
 struct AssetHeader {

@@ -4,25 +4,12 @@
 #include <cmath>
 
 #include <fmt/format.h>
-#include <glm/geometric.hpp>
 
 #include "mesostructure/method.h"
 
 namespace vcp::meso {
 
 namespace {
-
-/// Returns the gradient of a shape's field by differences over `step`, as a unit vector; 0 where there is none.
-glm::dvec3 normalAt(const Shape& shape, glm::dvec3 p, glm::dvec3 step) {
-    glm::dvec3 gradient;
-    for (int axis = 0; axis < 3; ++axis) {
-        glm::dvec3 off(0);
-        off[axis] = step[axis];
-        gradient[axis] = (shape.field(p + off) - shape.field(p - off)) / step[axis];
-    }
-    const double size = glm::length(gradient);
-    return size > 0 ? gradient / size : glm::dvec3(0);
-}
 
 uint32_t byteOf(double unit) { return uint32_t(int(std::lround(std::clamp(unit, -1.0, 1.0) * 127))) & 0xff; }
 
@@ -48,9 +35,10 @@ Result<PropertyVolume> sampleProperties(const Shape& shape, glm::ivec3 points) {
                 const glm::dvec3 p = glm::dvec3(x, y, z) * spacing;
                 const double field = shape.field(p);
                 // Far from the surface nothing reads the normal.
-                const glm::dvec3 normal =
-                    std::abs(field) < 3 * widest ? normalAt(shape, p, 0.5 * spacing) : glm::dvec3(0);
-                const auto density = uint32_t(std::lround(255 * std::clamp(0.5 - field / (2 * widest), 0.0, 1.0)));
+                const glm::dvec3 normal = std::abs(field) < 3 * widest ? shape.normal(p, 0.5 * spacing) : glm::dvec3(0);
+                // The field may be far less than the distance: over steep height fields it is.
+                const double off = std::abs(field) < widest ? shape.distance(p, widest) : widest;
+                const auto density = uint32_t(std::lround(255 * (0.5 - std::copysign(off, field) / (2 * widest))));
                 volume.texels.push_back(byteOf(normal.x) | byteOf(normal.y) << 8 | byteOf(normal.z) << 16 |
                                         density << 24);
             }

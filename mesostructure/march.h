@@ -25,6 +25,7 @@
 #include "mesostructure/gdm_map.h"
 #include "mesostructure/octant_boxes.h"
 #include "mesostructure/patches.h"
+#include "mesostructure/relief_layers.h"
 #include "mesostructure/sampled_field.h"
 
 namespace vcp::meso {
@@ -90,6 +91,8 @@ struct ReliefOptions {
     float tolerance = 0.01f;  ///< tolerance of |f| over the slab's height, as in the listing; 0: only the count ends it
 };
 std::unique_ptr<Marcher> reliefMarcher(const HeightMap& map, const ReliefOptions& options);
+/// The same for solids: f is above 0 where an even number of bounds is above the ray.
+std::unique_ptr<Marcher> reliefMarcher(const ReliefLayers& layers, const ReliefOptions& options);
 
 /// The maxima of a height map's bilinear cells, halved until one is left (Tevs et al. 2008).
 struct MaxPyramid {

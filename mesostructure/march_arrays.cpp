@@ -139,7 +139,7 @@ void addSkipping(const Skipping& skipping, MarchArrays& arrays) {
     }
 }
 
-/// A patch is five groups of four words: the quadric, the forms u and v, whether it is a triangle.
+/// A patch is five groups of four words: the quadric, the forms u and v, whether it is a triangle. Its normals are one.
 void addPatches(const PatchSet& set, MarchArrays& arrays) {
     std::vector<uint32_t>& words = arrays.words;
     arrays.record.data = add(set.ranks, words);
@@ -152,6 +152,7 @@ void addPatches(const PatchSet& set, MarchArrays& arrays) {
         std::memcpy(quads, &patch, sizeof patch);
         words.insert(words.end(), std::begin(quads), std::end(quads));
     }
+    if (!set.normals.empty()) arrays.record.patchNormals = add(set.normals, words) / 4;
 }
 
 void addSurface(const Surface& surface, MarchArrays& arrays) {
@@ -171,6 +172,18 @@ void addSurface(const Surface& surface, MarchArrays& arrays) {
     }
 }
 
+/// Returns what relief mapping over any data has in common.
+MarchArrays steppedArrays(glm::dvec3 extent, const ReliefOptions& options) {
+    constexpr uint32_t kRefinements[] = {kMesoUnrefined, kMesoBinary, kMesoSecant, kMesoAsPrinted, kMesoIllinois};
+    MarchArrays arrays;
+    arrays.constants = {.walk = kMesoRelief, .refinement = kRefinements[size_t(options.refinement)]};
+    setExtent(extent, arrays);
+    arrays.record.mostSteps = options.steps;
+    arrays.record.mostRefinements = options.refinements;
+    arrays.record.tolerance = options.tolerance;
+    return arrays;
+}
+
 }  // namespace
 
 Result<MarchArrays> gridArrays(const Skipping& skipping, const Surface& surface) {
@@ -184,14 +197,19 @@ Result<MarchArrays> gridArrays(const Skipping& skipping, const Surface& surface)
 }
 
 MarchArrays reliefArrays(const HeightMap& map, const ReliefOptions& options) {
-    constexpr uint32_t kRefinements[] = {kMesoUnrefined, kMesoBinary, kMesoSecant, kMesoAsPrinted, kMesoIllinois};
-    MarchArrays arrays;
-    arrays.constants = {.walk = kMesoRelief, .refinement = kRefinements[size_t(options.refinement)]};
-    setExtent(map.extent(), arrays);
-    arrays.record.mostSteps = options.steps;
-    arrays.record.mostRefinements = options.refinements;
-    arrays.record.tolerance = options.tolerance;
+    MarchArrays arrays = steppedArrays(map.extent(), options);
     addHeights(map, arrays);
+    align(arrays.words);
+    return arrays;
+}
+
+MarchArrays layeredArrays(const ReliefLayers& layers, const ReliefOptions& options) {
+    MarchArrays arrays = steppedArrays(layers.extent, options);
+    arrays.constants.surface = kMesoLayers;
+    arrays.record.fine = {layers.size, 1};
+    arrays.record.height = float(layers.extent.z);
+    arrays.record.levelCount = layers.layers;
+    arrays.record.data = add(layers.bounds, arrays.words);
     align(arrays.words);
     return arrays;
 }

@@ -28,6 +28,7 @@ struct MarchArrays {
 /// gdmArrays: Limit (2^31 words). Precondition: what gridMarcher checks.
 Result<MarchArrays> gridArrays(const Skipping& skipping, const Surface& surface);
 MarchArrays reliefArrays(const HeightMap& map, const ReliefOptions& options);
+MarchArrays layeredArrays(const ReliefLayers& layers, const ReliefOptions& options);
 MarchArrays pyramidArrays(const HeightMap& map);
 MarchArrays sphereArrays(const SphereMap& map);
 Result<MarchArrays> gdmArrays(const GdmMap& map);

@@ -1,4 +1,4 @@
-// Marchers of height fields: relief mapping, and the maximum pyramid.
+// Relief mapping of height fields and of layers of solids, and the maximum pyramid.
 #include <algorithm>
 
 #include "mesostructure/march_arrays.h"
@@ -35,6 +35,10 @@ MaxPyramid buildMaxPyramid(const HeightMap& map) {
 
 std::unique_ptr<Marcher> reliefMarcher(const HeightMap& map, const ReliefOptions& options) {
     return arrayMarcher(reliefArrays(map, options), map.texels.size() * 2, false);
+}
+
+std::unique_ptr<Marcher> reliefMarcher(const ReliefLayers& layers, const ReliefOptions& options) {
+    return arrayMarcher(layeredArrays(layers, options), layers.bytes(), false);
 }
 
 std::unique_ptr<Marcher> pyramidMarcher(const HeightMap& map) {

@@ -11,7 +11,8 @@ namespace vcp::meso {
 
 namespace {
 
-constexpr std::array<std::string_view, 21> kMethodNames = {"relief-linear",
+constexpr std::string_view kLayersName = "relief-layers";
+constexpr std::array<std::string_view, 22> kMethodNames = {"relief-linear",
                                                            "relief-binary",
                                                            "relief-secant",
                                                            "relief-secant-printed",
@@ -31,10 +32,11 @@ constexpr std::array<std::string_view, 21> kMethodNames = {"relief-linear",
                                                            "gdm-visibility",
                                                            "gdm-safe",
                                                            "vdm",
-                                                           "slices"};
+                                                           "slices",
+                                                           kLayersName};
 constexpr std::array<Refinement, 5> kRefinements = {Refinement::None, Refinement::Binary, Refinement::Secant,
                                                     Refinement::SecantAsPrinted, Refinement::Illinois};
-constexpr int kDefaultCells = 64, kDefaultPoints = 32;
+constexpr int kDefaultCells = 64, kDefaultPoints = 32, kDefaultTexels = 256, kDefaultLayers = 4;
 
 template <class T>
 Result<void> take(Result<T> made, std::unique_ptr<T>& to) {
@@ -129,12 +131,15 @@ Result<MarchArrays> Method::arrays() const {
     const bool isComplete = kind == WalkKind::Sphere         ? sphere != nullptr
                             : kind == WalkKind::Displacement ? gdm != nullptr
                             : kind == WalkKind::Slices       ? volume != nullptr
+                            : kind == WalkKind::Layers       ? layers != nullptr
                             : kind != WalkKind::Grid         ? heights != nullptr
                                                              : boxes || compressed || distances || occupancy;
     if (!isComplete) return Error{.code = ErrorCode::Usage, .message = "a mesostructure method without its arrays"};
     switch (kind) {
         case WalkKind::Relief:
             return reliefArrays(*heights, relief);
+        case WalkKind::Layers:
+            return layeredArrays(*layers, relief);
         case WalkKind::Pyramid:
             return pyramidArrays(*heights);
         case WalkKind::Sphere:
@@ -152,6 +157,8 @@ Result<std::unique_ptr<Marcher>> Method::marcher() const {
     switch (kind) {
         case WalkKind::Relief:
             return reliefMarcher(*heights, relief);
+        case WalkKind::Layers:
+            return reliefMarcher(*layers, relief);
         case WalkKind::Pyramid:
             return pyramidMarcher(*heights);
         case WalkKind::Sphere:
@@ -168,7 +175,7 @@ Result<std::unique_ptr<Marcher>> Method::marcher() const {
 std::span<const std::string_view> methodNames() { return kMethodNames; }
 
 bool methodFits(std::string_view name, const Asset& asset) {
-    return asset.heights.has_value() || !(name.starts_with("relief") || name == "pyramid");
+    return asset.heights.has_value() || name == kLayersName || !(name.starts_with("relief") || name == "pyramid");
 }
 
 GdmOptions tracedBy(const Shape& shape, const MethodOptions& options) {
@@ -189,6 +196,18 @@ Result<Method> buildMethod(const Asset& asset, const Shape& shape, const MethodO
         return Error{.code = ErrorCode::Usage,
                      .message = fmt::format("{} is for height fields; {} is a solid", name, asset.name)};
     Method method;
+    if (name == kLayersName) {
+        method.kind = WalkKind::Layers;
+        method.relief = {.steps = options.steps,
+                         .refinement = Refinement::Binary,
+                         .refinements = options.refinements,
+                         .tolerance = options.tolerance};
+        const int n = options.cells != 0 ? options.cells : kDefaultTexels;
+        VCP_TRY(take(traceLayers(shape, {n, std::max(1, int(std::lround(n * shape.extent().y)))},
+                                 options.layers != 0 ? options.layers : kDefaultLayers),
+                     method.layers));
+        return method;
+    }
     if (name.starts_with("relief") || name == "pyramid") {
         method.kind = name == "pyramid" ? WalkKind::Pyramid : WalkKind::Relief;
         method.heights = &*asset.heights;

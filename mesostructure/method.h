@@ -13,7 +13,7 @@
 
 namespace vcp::meso {
 
-enum class WalkKind { Grid, Relief, Pyramid, Sphere, Displacement, Slices };
+enum class WalkKind { Grid, Relief, Layers, Pyramid, Sphere, Displacement, Slices };
 
 struct Method {
     WalkKind kind = WalkKind::Grid;
@@ -32,6 +32,7 @@ struct Method {
     int mostGuesses = 1;
     std::unique_ptr<GdmMap> gdm;
     std::unique_ptr<PropertyVolume> volume;
+    std::unique_ptr<ReliefLayers> layers;
 
     [[nodiscard]] Skipping skipping() const;
     [[nodiscard]] Surface surface() const {
@@ -45,15 +46,18 @@ struct Method {
 
 struct MethodOptions {
     std::string name = "boxes";
-    int cells = 0;      ///< cells of the grid, or points of a map, along x; 0: the asset's own grid, or 64; points 32
+    /// Cells of the grid, points of a map or texels of layers, along x; 0: the asset's own grid, or 64; points 32,
+    /// texels 256.
+    int cells = 0;
     Cones cones{4, 1};  ///< cones of all ddm
     int steps = 32;     ///< steps of relief mapping
     int refinements = 10;
     float tolerance = ReliefOptions().tolerance;
-    int rank = 16;                         ///< terms of gdm, gdm-visibility and vdm; 0: the table itself
-    int bits = 16;                         ///< of their values: 8 or 16
-    glm::ivec2 directions{16, 32};         ///< theirs: elevations over the sphere (vdm: over its lower half), azimuths
-    int layers = 0;                        ///< points along z of a map or of slices; 0: as far apart as along x
+    int rank = 16;                  ///< terms of gdm, gdm-visibility and vdm; 0: the table itself
+    int bits = 16;                  ///< of their values: 8 or 16
+    glm::ivec2 directions{16, 32};  ///< theirs: elevations over the sphere (vdm: over its lower half), azimuths
+    /// Points along z of a map or of slices; 0: as far apart as along x. Bounds a texel of relief-layers; 0: 4.
+    int layers = 0;
     const DistanceTable* table = nullptr;  ///< traced already by tracedBy of these options; null: it is traced
     /// As GdmOptions::shareOut, of that tracing.
     std::function<bool(size_t count, const std::function<void(size_t first, size_t last)>& fill)> shareOut = {};
@@ -65,8 +69,8 @@ struct MethodOptions {
 
 /// The names for height fields only: "relief-linear", "relief-binary", "relief-secant", "relief-secant-printed",
 /// "relief-illinois", "pyramid". For all: "sphere", "dm", "ddm", "ddm-quadric", "ddm-quadric-fitted", "ddm-compressed",
-/// "ddm-cells", "quadric", "boxes", "cells", "gdm", "gdm-visibility", "gdm-safe", "vdm", "slices". Beside
-/// "ddm-quadric", which is compressed, "ddm-compressed" has no quadrics, "quadric" steps from cell to cell, and
+/// "ddm-cells", "quadric", "boxes", "cells", "gdm", "gdm-visibility", "gdm-safe", "vdm", "slices", "relief-layers".
+/// Beside "ddm-quadric", which is compressed, "ddm-compressed" has no quadrics, "quadric" steps from cell to cell, and
 /// "ddm-cells" has the exact cells of "boxes" under the distances of "ddm".
 std::span<const std::string_view> methodNames();
 /// Whether a method of that name marches the asset: some march only height fields.

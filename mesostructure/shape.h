@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
 
 #include "mesostructure/tile_grid.h"
@@ -38,6 +39,18 @@ public:
     [[nodiscard]] virtual bool mayTouch(glm::dvec3 lower, glm::dvec3 upper) const = 0;
     /// Returns the first crossing from outside to inside at 0 <= t <= tMax; the direction is a unit vector.
     [[nodiscard]] virtual TruthHit trace(glm::dvec3 origin, glm::dvec3 direction, double tMax) const = 0;
+
+    /// Returns the gradient of the field by differences over `step` to either side, as a unit vector; 0 where it is 0.
+    [[nodiscard]] glm::dvec3 normal(glm::dvec3 point, glm::dvec3 step) const {
+        glm::dvec3 gradient(0);
+        for (int axis = 0; axis < 3; ++axis) {
+            glm::dvec3 off(0);
+            off[axis] = step[axis];
+            gradient[axis] = (field(point + off) - field(point - off)) / step[axis];
+        }
+        const double size = glm::length(gradient);
+        return size > 0 ? gradient / size : glm::dvec3(0);
+    }
 
 private:
     glm::dvec3 extent_;

@@ -9,8 +9,10 @@ double shadowLift(const meso::MarchArrays& arrays, double tileEdge) {
         c.walk == meso::f32::kMesoPyramid || c.surface == meso::f32::kMesoHeights || c.surface == meso::f32::kMesoField;
     if (r.fine.x > 0 && (isExact || c.walk == meso::f32::kMesoRelief))
         return (isExact ? 0.25 : 1.5) * tileEdge / r.fine.x;
-    // A displacement map is 0 within the solid, and filtered with what lies around.
-    return (c.walk >= meso::f32::kMesoGdm ? 1.5 : 0.5) * tileEdge * double(r.cell.x);
+    // A displacement map is 0 within the solid, and filtered with what lies around; and one that tells hits by their
+    // density takes what goes by within a point of the solid for a hit (docs/benchmarks/meso.md, leak and acne).
+    const bool isOfDensity = c.walk == meso::f32::kMesoGdm && c.surface == meso::f32::kMesoDensity;
+    return (isOfDensity ? 3 : c.walk >= meso::f32::kMesoGdm ? 1.5 : 0.5) * tileEdge * double(r.cell.x);
 }
 
 }  // namespace vcp

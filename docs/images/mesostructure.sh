@@ -47,6 +47,14 @@ done
 cp "$images/../scenes/beads_dog.json" "$scratch"
 "$build/vcp" render "$scratch/beads_dog.json" -o "$images/scene_dog.png" --size 480x400 --shadows --progress none
 
+# Figures 8, 9 and 10 of Wang et al. 2004.
+figure() { "$build/vcp" render "$1/gdm_$2.json" -o "$images/meso_gdm_$2.png" --methods "$3" --size 300x240 --shadows --progress none; }
+for name in sheet vase; do figure "$images/../scenes" $name gdm-visibility,vdm,boxes; done
+for name in torus bird dinosaur; do figure "$images/../scenes" $name gdm-visibility,boxes; done
+"$build/vcp" meso build bark -o "$scratch/bark.meso" --transfer 32 --paths 256 --progress none
+cp "$images/../scenes/gdm_tree.json" "$scratch"
+figure "$scratch" tree gdm-visibility,boxes
+
 # Iterations of five methods on the same rays.
 draw heat '{"asset": "hemispheres", "tiles": 2}' --methods relief-binary,dm,ddm,ddm-quadric,boxes --shading steps --size 200x110 --camera 30,12,1.5
 

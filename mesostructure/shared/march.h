@@ -66,8 +66,13 @@ INLINE void marchGrid(MesoRay ray, INOUT(MesoResult) result) {
 
 // f > 0 above the height field; texels along x and y, the slab's height along z.
 INLINE float reliefF(vec3 o, vec3 d, float t, INOUT(MesoResult) result) {
-    result.fetches++;
     vec3 p = o + t * d, first = floor(p);
+    if (kSurface == kMesoLayers) {
+        // Four bounds are a texel of four channels.
+        result.fetches += uint(meso.levelCount + 3) / 4u;
+        return aboveLayers(p);
+    }
+    result.fetches++;
     return p.z - blendCorners(heightsAt(int(first.x), int(first.y)) * (1.0f / 65535.0f), p - first);
 }
 
@@ -160,7 +165,7 @@ INLINE void marchRelief(MesoRay ray, INOUT(MesoResult) result) {
         at.high = end * (float(i) / float(steps));
         at.fHigh = reliefF(at.o, at.d, at.high, result);
         // The slab's bottom is below every height, however it rounds.
-        if (i == steps && bottomIsEnd) at.fHigh = min(at.fHigh, 0.0f);
+        if (i == steps && bottomIsEnd && kSurface != kMesoLayers) at.fHigh = min(at.fHigh, 0.0f);
         if (at.fLow > 0.0f && at.fHigh <= 0.0f) {
             result.state = kMesoHit;
             if (kRefinement == kMesoAsPrinted)

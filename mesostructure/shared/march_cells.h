@@ -14,6 +14,8 @@ INLINE bool meetPatches(CONST_REF(Walk) w, float from, float to, INOUT(MesoResul
     result.fetches++;
     uint row = fetchWord(meso.rows + fetchWord(rank + 1u) + uint(bitCount(mask & (bit - 1u))));
     vec3 o = walkAt(w, from) - vec3(w.cell), gradient = vec3(0.0f);
+    vec2 at = vec2(0.0f);
+    uint number = 0u, isTriangle = 0u;
     float best = kFar;
     for (uint i = row >> 4; i < (row >> 4) + (row & 15u); ++i) {
         // A patch is read in groups of four words: ten coefficients, two linear forms.
@@ -22,15 +24,22 @@ INLINE bool meetPatches(CONST_REF(Walk) w, float from, float to, INOUT(MesoResul
         Patch it = fetchPatch(i);
         float s = crossPatch(it, o, w.d, to - from);
         if (s >= 0.0f && s < best) {
+            vec3 p = o + s * w.d;
             best = s;
-            gradient = patchGradient(it, o + s * w.d);
+            gradient = patchGradient(it, p);
+            at = vec2(dot(it.u, vec4(p, 1.0f)), dot(it.v, vec4(p, 1.0f)));
+            number = i;
+            isTriangle = it.isTriangle;
         }
     }
     if (best >= kFar) return false;
     result.t = from + best;
     vec3 normal = gradient / meso.cell;
-    if (dot(normal, w.d * meso.cell) > 0.0f) normal = -normal;
-    result.normal = normalize(normal);
+    // It is read once a ray and changes no hit, so it is not counted.
+    if (meso.patchNormals != 0u)
+        normal = blendNormals(fetchQuad(meso.patchNormals + number), at, isTriangle != 0u, normal);
+    // A patch has no inside: it shows the side that the ray comes to.
+    result.normal = normalize(dot(gradient, w.d) > 0.0f ? -normal : normal);
     return true;
 }
 

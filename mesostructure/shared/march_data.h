@@ -171,6 +171,28 @@ INLINE vec4 heightsAt(int x, int y) {
                 fetchShort(meso.data, at.w));
 }
 
+// Blends the values at four corners, x fastest.
+INLINE float blendCorners(vec4 v, vec3 w) { return mix(mix(v.x, v.y, w.x), mix(v.z, v.w, w.x), w.y); }
+
+// Returns how far a point is from the nearest bound of its column, along z; below 0 within the solid, which is where an
+// odd number of bounds is above it. x and y are in texels, z in the slab's height.
+INLINE float aboveLayers(vec3 p) {
+    vec3 first = floor(p);
+    uvec4 at = cornersOf(int(first.x), int(first.y), ivec2(meso.fine)) * uint(meso.levelCount);
+    float nearest = kFar;
+    bool inside = false;
+    for (int k = 0; k < meso.levelCount; ++k) {
+        vec4 bounds = vec4(fetchShort(meso.data, at.x), fetchShort(meso.data, at.y), fetchShort(meso.data, at.z),
+                           fetchShort(meso.data, at.w));
+        float off = blendCorners(bounds * (1.0f / 65535.0f), p - first) - p.z;
+        if (off > 0.0f) inside = !inside;
+        nearest = min(nearest, abs(off));
+        at = at + 1u;
+    }
+    // On a bound, outside is outside: at the slab's bottom lie the bounds that are missing.
+    return inside ? -nearest : max(nearest, 1e-9f);
+}
+
 // Returns the samples at the corners of a field's cell, below and above.
 INLINE void fieldAt(ivec3 cell, OUT(vec4) v0, OUT(vec4) v1) {
     uint plane = uint(meso.fine.x * meso.fine.y);
@@ -190,6 +212,3 @@ INLINE void distancesAt(vec3 p, OUT(vec4) v0, OUT(vec4) v1, OUT(vec3) w) {
     v0 = samplesAt(column + uint(z.x) * plane);
     v1 = samplesAt(column + uint(z.y) * plane);
 }
-
-// Blends the values at four corners, x fastest.
-INLINE float blendCorners(vec4 v, vec3 w) { return mix(mix(v.x, v.y, w.x), mix(v.z, v.w, w.x), w.y); }

@@ -9,9 +9,10 @@ const uint kMesoMostBorders = 32u;
 const uint kMesoGrid = 0u, kMesoRelief = 1u, kMesoPyramid = 2u, kMesoSphere = 3u, kMesoGdm = 4u, kMesoVdm = 5u,
            kMesoSlices = 6u;                                                                                  // kWalk
 const uint kMesoOccupancy = 0u, kMesoDistances = 1u, kMesoCompressed = 2u, kMesoBoxes = 3u, kMesoGuess = 4u;  // kSkip
-const uint kMesoTable = 0u, kMesoFactored = 1u;                                    // kSkip of a displacement map
-const uint kMesoDensity = 0u, kMesoVisibilityBit = 1u;                             // kSurface of a displacement map
-const uint kMesoCell = 0u, kMesoPatches = 1u, kMesoHeights = 2u, kMesoField = 3u;  // kSurface
+const uint kMesoTable = 0u, kMesoFactored = 1u;         // kSkip of a displacement map
+const uint kMesoDensity = 0u, kMesoVisibilityBit = 1u;  // kSurface of a displacement map
+const uint kMesoCell = 0u, kMesoPatches = 1u, kMesoHeights = 2u, kMesoField = 3u,
+           kMesoLayers = 4u;  // kSurface; the last of relief mapping
 const uint kMesoUnrefined = 0u, kMesoBinary = 1u, kMesoSecant = 2u, kMesoAsPrinted = 3u,
            kMesoIllinois = 4u;  // kRefinement
 
@@ -49,7 +50,7 @@ struct MesoRecord {
     int mostSteps;                         // (sphere, relief)
     ivec3 ratio;                           // texels or samples a cell
     int mostRefinements;                   // (relief)
-    int azimuths, elevations, levelCount;  // (displacement maps, guesses) the last is groups of terms
+    int azimuths, elevations, levelCount;  // (displacement maps, guesses) the last is groups of terms, or of layers
     int columnCount;                       // (displacement maps, guesses) of the matrix; its rows are cellCount
     ivec3 top;                             // (compressed) entries of level 0
     int clusters;                          // (guesses)
@@ -62,10 +63,10 @@ struct MesoRecord {
     uint data;                             // word of texels, samples or ranks
     uint rows;                             // word of the rows
     uint patches;                          // first quad of the patches
-    float step;       // tile units of a step of a height or (sphere, displacement maps) of a distance
-    float height;     // of the slab, tile units
-    float tolerance;  // (relief)
-    float unused0;
+    float step;         // tile units of a step of a height or (sphere, displacement maps) of a distance
+    float height;       // of the slab, tile units
+    float tolerance;    // (relief)
+    uint patchNormals;  // first quad of the patches' normals; 0: there are none
     MesoLevel levels[kMesoMaxLevels];
     MesoBorder borders[kMesoMostBorders];
 };

@@ -45,6 +45,24 @@ INLINE float crossPatch(CONST_REF(Patch) it, vec3 o, vec3 d, float span) {
     return -1.0f;
 }
 
+// Returns a direction of octahedral coordinates (meso::PatchNormals), not of unit length.
+INLINE vec3 unfoldNormal(uint code) {
+    float x = float(int(code << 16) >> 16) / 32767.0f, y = float(int(code) >> 16) / 32767.0f;
+    float z = 1.0f - abs(x) - abs(y), fold = max(-z, 0.0f);
+    return vec3(x >= 0.0f ? x - fold : x + fold, y >= 0.0f ? y - fold : y + fold, z);
+}
+
+// Returns the blend of a patch's normals at its u and v; `own` where they leave none.
+INLINE vec3 blendNormals(uvec4 codes, vec2 at, bool isTriangle, vec3 own) {
+    vec2 w = clamp(at, 0.0f, 1.0f);
+    vec3 sum = isTriangle ? vec3(0.0f) : w.x * w.y * normalize(unfoldNormal(codes.z));
+    float away = isTriangle ? max(1.0f - w.x - w.y, 0.0f) : (1.0f - w.x) * (1.0f - w.y);
+    float right = isTriangle ? w.x : w.x * (1.0f - w.y), up = isTriangle ? w.y : w.y * (1.0f - w.x);
+    sum += away * normalize(unfoldNormal(codes.x)) + right * normalize(unfoldNormal(codes.y)) +
+           up * normalize(unfoldNormal(codes.w));
+    return dot(sum, sum) > 1e-6f ? sum : own;
+}
+
 INLINE vec3 patchGradient(CONST_REF(Patch) it, vec3 p) {
     return vec3(2.0f * it.quadric[0] * p.x + it.quadric[3] * p.y + it.quadric[5] * p.z + it.quadric[6],
                 2.0f * it.quadric[1] * p.y + it.quadric[3] * p.x + it.quadric[4] * p.z + it.quadric[7],

@@ -20,6 +20,14 @@ vec3 cutNormal;
 
 // Gives a normal where the method has none: that of the nearest data, or of the voxel's face.
 INLINE vec3 fallbackNormal(vec3 p, vec3 d) {
+    if (kWalk == kMesoRelief && kSurface == kMesoLayers) {
+        // The gradient over a texel and a hundredth of the slab.
+        vec3 scale = vec3(float(meso.fine.x), float(meso.fine.x), 1.0f / meso.height), at = p * scale;
+        vec3 x = vec3(0.5f, 0.0f, 0.0f), y = vec3(0.0f, 0.5f, 0.0f), z = vec3(0.0f, 0.0f, 0.005f);
+        return vec3(aboveLayers(at + x) - aboveLayers(at - x), aboveLayers(at + y) - aboveLayers(at - y),
+                    100.0f * (aboveLayers(at + z) - aboveLayers(at - z))) *
+               scale;
+    }
     if (kWalk == kMesoRelief) {
         vec3 at = p * float(meso.fine.x), i = floor(at);
         vec4 h = heightsAt(int(i.x), int(i.y)) * meso.step;

@@ -1,6 +1,7 @@
 // Assets: what was written is read back, and every changed, cut or lying byte is refused.
 #include "mesostructure/asset_file.h"
 
+#include <algorithm>
 #include <cstring>
 #include <fstream>
 #include <random>
@@ -65,6 +66,8 @@ TEST(AssetFile, GivesBackWhatWasWritten) {
         EXPECT_EQ(read->distances->steps, asset.distances->steps);
         EXPECT_EQ(read->boxes->boxes, asset.boxes->boxes);
         EXPECT_EQ(read->patches->rows, asset.patches->rows);
+        EXPECT_EQ(read->patches->normals, asset.patches->normals);
+        EXPECT_EQ(read->patches->normals.size(), read->patches->patches.size());
         EXPECT_EQ(read->triangles, asset.triangles);
         EXPECT_EQ(read->compressed->bytes(), asset.compressed->bytes());
         EXPECT_EQ(read->heights ? read->heights->texels : std::vector<uint16_t>(),
@@ -214,7 +217,7 @@ TEST(AssetFile, LiesBehindValidHashesAreRefusedOrHarmless) {
     for (int i = 0; i < 3000; ++i) {
         Bytes changed = bytes;
         // Within chunks: behind the header and the table.
-        const size_t first = 256 + 48 * 7, at = first + random() % (changed.size() - first - 64);
+        const size_t first = 256 + 48 * 8, at = first + random() % (changed.size() - first - 64);
         const uint32_t value = i % 3 == 0 ? 0xffffffffu : uint32_t(random());
         std::memcpy(changed.data() + at, &value, std::min<size_t>(4, changed.size() - 64 - at));
         resign(changed);
@@ -227,6 +230,51 @@ TEST(AssetFile, LiesBehindValidHashesAreRefusedOrHarmless) {
         for (int k = 0; k < 5; ++k) static_cast<void>((*marcher)->march(test::rayFromTop(random, read->extent)));
     }
     EXPECT_GT(refused, 300);
+}
+
+/// Patches had no normals at first.
+TEST(AssetFile, PatchesWithoutNormalsOpenAndStaySo) {
+    const TestFolder folder("meso_asset_normals_test");
+    Asset asset = small("ball");
+    const uint64_t with = *writeAsset(folder / "with.meso", asset);
+    asset.patches->normals.clear();
+    EXPECT_LT(*writeAsset(folder / "without.meso", asset), with);
+    const auto read = readAsset(folder / "without.meso");
+    ASSERT_TRUE(read.ok()) << read.error().line();
+    EXPECT_EQ(read->patches->patches.size(), asset.patches->patches.size());
+    EXPECT_TRUE(read->patches->normals.empty());
+    EXPECT_EQ(gridArrays({.occupancy = &*read->occupancy}, {.patches = &*read->patches})->record.patchNormals, 0u);
+    ASSERT_TRUE(writeAsset(folder / "again.meso", *read).ok());
+    EXPECT_EQ(contentOf(folder / "without.meso"), contentOf(folder / "again.meso"));
+}
+
+/// Normals of another version, of other patches or before them are refused in one line.
+TEST(AssetFile, NormalsThatAreNotOfThePatchesAreRefused) {
+    const TestFolder folder("meso_asset_normals_lies_test");
+    ASSERT_TRUE(writeAsset(folder / "a.meso", small("ball")).ok());
+    const Bytes bytes = bytesOf(folder / "a.meso");
+    AssetHeader header;
+    std::memcpy(&header, bytes.data(), sizeof header);
+    std::vector<AssetChunk> table(header.chunks);
+    std::memcpy(table.data(), bytes.data() + sizeof header, table.size() * sizeof(AssetChunk));
+    const auto normals = std::ranges::find(table, ChunkKind::Normals, &AssetChunk::kind);
+    ASSERT_NE(normals, table.end());
+    const auto refused = [&](size_t at, uint32_t value) {
+        Bytes changed = bytes;
+        std::memcpy(changed.data() + at, &value, sizeof value);
+        resign(changed);
+        const auto read = parseAsset(changed, "lie");
+        EXPECT_FALSE(read.ok());
+        if (!read.ok()) {
+            EXPECT_EQ(read.error().line().find('\n'), std::string::npos);
+        }
+    };
+    refused(normals->offset, 2);
+    refused(normals->offset + 4, uint32_t(normals->bytes / sizeof(PatchNormals)) - 1);
+    refused(normals->offset + 4, 0xffffffffu);
+    // The patches' chunk becomes one of normals, so these have no patches.
+    const auto patches = std::ranges::find(table, ChunkKind::Patches, &AssetChunk::kind);
+    refused(sizeof header + size_t(patches - table.begin()) * sizeof(AssetChunk), uint32_t(ChunkKind::Guesses));
 }
 
 TEST(AssetFile, LiesOfMapsAreRefusedOrHarmless) {

@@ -119,7 +119,7 @@ TEST(FrameLayout, Mesostructure) {
                                                AT(MesoRecord, skipping),   AT(MesoRecord, data),
                                                AT(MesoRecord, rows),       AT(MesoRecord, patches),
                                                AT(MesoRecord, step),       AT(MesoRecord, height),
-                                               AT(MesoRecord, tolerance),  AT(MesoRecord, unused0),
+                                               AT(MesoRecord, tolerance),  AT(MesoRecord, patchNormals),
                                                AT(MesoRecord, levels),     AT(MesoRecord, borders)}));
     EXPECT_EQ(offsets.at("MesoLevel"), (Words{AT(MesoLevel, first), AT(MesoLevel, entries),
                                               AT(MesoLevel, edgeAndFactor), AT(MesoLevel, unused)}));

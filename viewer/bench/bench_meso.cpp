@@ -130,7 +130,10 @@ void addDisplacementMaps(std::vector<Entry>& all) {
         all.push_back(
             {"rank 16 grid 32 directions 8x16", false, {.name = name, .cells = 32, .rank = 16, .directions = {8, 16}}});
         all.push_back({"rank 16 grid 16", false, {.name = name, .cells = 16, .rank = 16}});
-        if (!isOfTop) continue;
+        if (!isOfTop) {
+            all.push_back({"table 16 bits grid 64", false, {.name = name, .cells = 64, .rank = 0}});
+            continue;
+        }
         for (const int cells : {64, 128, 256}) {
             all.push_back({fmt::format("rank 16 grid {}", cells), false, {.name = name, .cells = cells, .rank = 16}});
             all.push_back(
@@ -174,6 +177,12 @@ std::vector<Entry> entries() {
     // The two pictures that Risser et al. print side by side.
     for (const char* name : {"relief-binary", "relief-secant", "relief-illinois"})
         all.push_back({"steps 5 refinements 2", false, {.name = name, .steps = 5, .refinements = 2, .tolerance = 0}});
+    for (const int steps : {32, 64, 128, 256})
+        for (const int layers : {4, 8})
+            for (const float tolerance : {0.01f, 0.0f})
+                all.push_back({fmt::format("steps {} layers {}{}", steps, layers, tolerance == 0 ? " tolerance 0" : ""),
+                               steps == 32 && layers == 4 && tolerance > 0,
+                               {.name = "relief-layers", .steps = steps, .tolerance = tolerance, .layers = layers}});
     all.push_back({"exact", true, {.name = "pyramid"}});
     for (const char* name : {"sphere", "dm"})
         for (const int cells : {32, 64, 128})
@@ -400,8 +409,10 @@ Result<BenchMesoReport> benchMeso(const BenchMesoOptions& options) {
     if (options.prisms) report.prisms = compareMesoPrisms(uint64_t(options.rays));
     std::vector<MesoPublished> ofModels;
     if (options.models) {
-        VCP_TRY_ASSIGN(report.models, compareMesoModels(options.device.value_or(kHostName), options.repetitions,
-                                                        ofModels, options.progress));
+        VCP_TRY_ASSIGN(report.models, compareMesoModels({.device = options.device.value_or(kHostName),
+                                                         .repetitions = options.repetitions,
+                                                         .progress = options.progress},
+                                                        ofModels));
     }
     for (size_t a = 0; a < assets.size(); ++a) {
         const auto told = [&](const std::string& what) {
@@ -414,6 +425,12 @@ Result<BenchMesoReport> benchMeso(const BenchMesoOptions& options) {
             if (!told("factors")) return Error::cancelled();
             VCP_TRY_ASSIGN(const auto factors, compareMesoFactors(subject->asset, *subject->shape));
             report.factors.insert(report.factors.end(), factors.begin(), factors.end());
+        }
+        if (options.shadows) {
+            VCP_TRY_ASSIGN(const auto shadows,
+                           compareMesoShadows(subject->asset, *subject->shape, uint64_t(options.rays),
+                                              [&](double) { return told("shadows"); }));
+            report.shadows.insert(report.shadows.end(), shadows.begin(), shadows.end());
         }
         if (options.light) {
             const auto lit = [&](double part) {

@@ -34,6 +34,7 @@ struct BenchMesoOptions {
     int repetitions = 3;                ///< rounds over the methods
     bool published = false;             ///< compares with the papers' tables, each method at the knobs that these need
     bool factors = false;               ///< compares the factors of displacement maps
+    bool shadows = false;               ///< compares shadows by displacement maps with the shape's
     bool light = false;                 ///< compares light from everywhere on a tile with a path tracer
     bool prisms = false;                ///< measures what maps from prisms to tile space distort
     bool models = false;                ///< times frames of six models, on `device`, or by the host
@@ -110,6 +111,20 @@ struct MesoHeadline {
     double ratioToPeer = 0;  ///< mean over the views
 };
 
+/// What octant boxes take beside a rival that is as right: at the rival's cheapest knob with at most 0.1 % wrong rays
+/// over all views and p95 within 0.25 texels in each, or where none gets there, at the knob with the fewest wrong rays;
+/// boxes are at their cheapest knob that is no worse in either.
+struct MesoGoal {
+    std::string asset, rival, rivalKnob;
+    bool rivalIsRight = false;
+    double rivalWrong = 0, rivalP95 = 0;
+    std::string oursKnob = {};
+    double oursWrong = 0, oursP95 = 0;
+    double time = 0, fetches = 0;  ///< ours over the rival's
+    std::string rightKnob = {};    ///< our cheapest within 0.1 % and 0.25 texels; empty: none
+    double rightTime = 0;          ///< of that knob, over the rival's
+};
+
 /// Says how well factors stand for a displacement map's distances, over all its entries.
 struct MesoFactors {
     std::string asset, form;
@@ -118,6 +133,16 @@ struct MesoFactors {
     double rmsPoints = 0;   ///< root of the mean squared error, in points' distances
     double offByPoint = 0;  ///< part of the entries that are off by more than one
     double wrongHits = 0;   ///< part whose hit, told by half a point before the boundary, is wrong
+};
+
+/// What a method makes of the shape's own shadows, at places that face a light; parts are of all these places.
+struct MesoShadows {
+    std::string asset, method;
+    double offsetPoints = 0;  ///< by which it is asked above the surface, in distances of the map's points (or samples)
+    bool ownHits = false;     ///< from where the method sees the surface, or else from where it is
+    uint64_t places = 0;
+    double dark = 0;            ///< part that should be dark
+    double leak = 0, acne = 0;  ///< part that should be dark and is lit, and the converse
 };
 
 /// Light from everywhere on a picture of one tile, at 45 degrees, or of a base surface, drawn by the host. `form`: as
@@ -191,6 +216,7 @@ struct BenchMesoReport {
     std::vector<MesoCheck> checks;
     std::vector<MesoPublished> published;
     std::vector<MesoFactors> factors;
+    std::vector<MesoShadows> shadows;
     std::vector<MesoLight> lights;
     std::vector<MesoPrisms> prisms;
     std::vector<MesoModel> models;
@@ -213,6 +239,12 @@ Result<std::vector<MesoCheck>> checkMesoMaps(const std::string& asset, const mes
 /// Compares factors of an asset's displacement map of 32 points along x. Errors: the builders'.
 Result<std::vector<MesoFactors>> compareMesoFactors(const meso::Asset& asset, const meso::Shape& shape);
 
+/// Compares shadows by an asset's displacement map of 32 points along x, asked from several heights above the surface,
+/// and by octant boxes with the shape's own: places that `rays` rays see, each in one light. `progress` may be empty;
+/// false cancels. Errors: the builders'; Cancelled.
+Result<std::vector<MesoShadows>> compareMesoShadows(const meso::Asset& asset, const meso::Shape& shape, uint64_t rays,
+                                                    const std::function<bool(double)>& progress);
+
 /// Compares light from everywhere on an asset's tile, and on two base surfaces, under each of kEnvironmentNames; where
 /// the asset holds no transfer, it is traced. `name`: as openMesoAsset. `progress` may be empty; false cancels. Errors:
 /// traceTransfer's; Usage (nothing is seen).
@@ -225,12 +257,20 @@ inline double processorNs() { return double(std::clock()) * 1e9 / CLOCKS_PER_SEC
 /// Measures what maps of prisms distort, on tori of several curvatures and numbers of triangles.
 std::vector<MesoPrisms> compareMesoPrisms(uint64_t rays);
 
+struct MesoModelOptions {
+    std::string device;                 ///< as RendererOptions::device
+    int repetitions = 3;                ///< rounds over the models
+    uint32_t across = 640, down = 480;  ///< pixels of a picture
+    int cells = 0;                      ///< along x, of all methods and of transfer; 0: as printed, or their own
+    uint32_t paths = 256;               ///< a cell of transfer
+    /// Called with what is being done; false cancels. May be empty.
+    std::function<bool(const std::string& what, double part)> progress = {};
+};
+
 /// Times frames of the six models that Wang et al. 2004 print rates of, in rounds over all of them, and adds the ratios
-/// beside the printed ones. `device`: as RendererOptions::device; `progress` may be empty; false cancels. Errors: those
-/// of the renderer and of traceTransfer; Cancelled.
-Result<std::vector<MesoModel>> compareMesoModels(
-    const std::string& device, int repetitions, std::vector<MesoPublished>& published,
-    const std::function<bool(const std::string& what, double part)>& progress);
+/// beside the printed ones. Errors: those of the renderer and of traceTransfer; Cancelled.
+Result<std::vector<MesoModel>> compareMesoModels(const MesoModelOptions& options,
+                                                 std::vector<MesoPublished>& published);
 
 /// Judges the rays whose truth is known; `texel` in tile units.
 MesoJudged judgeMeso(const std::vector<meso::MarchResult>& results, const std::vector<meso::TruthHit>& truths,
@@ -245,6 +285,9 @@ std::vector<MesoPublished> publishedOf(const std::vector<BenchMesoRow>& rows);
 
 /// Returns the methods with a knob that qualifies, by asset in the order of the rows.
 std::vector<MesoHeadline> headlinesOf(const std::vector<BenchMesoRow>& rows);
+
+/// Compares octant boxes with displacement maps and slices, as far as there are rows of both.
+std::vector<MesoGoal> goalsOf(const std::vector<BenchMesoRow>& rows);
 
 std::string benchMesoJson(const BenchMesoReport& report);
 std::string benchMesoCsv(const BenchMesoReport& report);

@@ -49,14 +49,15 @@ constexpr std::array<TableSurface, 4> kSurfaces = {{{"quad", 0.38, 0.14, 0.34},
                                                     {"box", 0.46, 0.23, 1.09}}};
 constexpr const char* kReliefName = "relief-binary";
 
-/// Returns the methods of that table, at its resolutions; relief mapping comes first.
-std::array<MethodOptions, 4> tableMethods() {
+/// Returns the methods of that table, at its resolutions or in `cells` where these are not 0; relief mapping comes
+/// first.
+std::array<MethodOptions, 4> tableMethods(int cells = 0) {
+    const auto orPrinted = [cells](int printed) { return cells != 0 ? cells : printed; };
     return {{{.name = kReliefName},
-             {.name = "dm", .cells = 128},
-             {.name = "ddm-compressed", .cells = 128},
-             {.name = "ddm-quadric-fitted", .cells = 16}}};
+             {.name = "dm", .cells = orPrinted(128)},
+             {.name = "ddm-compressed", .cells = orPrinted(128)},
+             {.name = "ddm-quadric-fitted", .cells = orPrinted(16)}}};
 }
-constexpr uint32_t kAcross = 640, kDown = 480;
 constexpr const char* kSky = "studio";
 
 /// A model that is drawn by one method, in one light.
@@ -76,15 +77,19 @@ struct Transferred {
 
 using Progress = std::function<bool(const std::string& what, double part)>;
 
-Result<Transferred> transferred(const Model& model, const Progress& progress) {
+Result<Transferred> transferred(const Model& model, const MesoModelOptions& options) {
     VCP_TRY_ASSIGN(const auto asset, openMesoAsset(model.asset));
     VCP_TRY_ASSIGN(const auto shape, shapeOf(asset));
     VCP_TRY_ASSIGN(auto base, makeBaseSurface(model.base, model.tiles));
-    const auto told = [&](double part) { return !progress || progress(fmt::format("light of {}", model.base), part); };
+    const auto told = [&](double part) {
+        return !options.progress || options.progress(fmt::format("light of {}", model.base), part);
+    };
     const auto shared = [&](size_t count, const std::function<void(size_t, size_t)>& fill) {
         return shareOut(count, fill, told);
     };
-    VCP_TRY_ASSIGN(auto volume, traceTransfer(*shape, {.paths = 256, .shareOut = shared}));
+    TransferOptions paths{.paths = options.paths, .shareOut = shared};
+    if (options.cells != 0) paths.cells = options.cells;
+    VCP_TRY_ASSIGN(auto volume, traceTransfer(*shape, paths));
     const double slab = tileEdge(base) * shape->extent().z;
     std::vector<SceneBase> bases{sceneBase(std::move(base), *shape, slab, 0, double(volume.albedo))};
     bases[0].isAsked = true;
@@ -120,12 +125,12 @@ struct Subject {
     MethodOptions method;
 };
 
-Result<Drawn> drawnBy(const Subject& subject, const Transferred* light, const std::string& device, AllArrays& arrays,
-                      const Progress& progress) {
+Result<Drawn> drawnBy(const Subject& subject, const Transferred* light, const MesoModelOptions& options,
+                      AllArrays& arrays) {
     VCP_TRY_ASSIGN(const auto asset, openMesoAsset(subject.asset));
     VCP_TRY_ASSIGN(const auto base, makeBaseSurface(subject.base, subject.tiles));
     MesoSurface surface;
-    VCP_TRY_ASSIGN(surface.arrays, arrays.of(subject.asset, asset, subject.method, progress));
+    VCP_TRY_ASSIGN(surface.arrays, arrays.of(subject.asset, asset, subject.method, options.progress));
     VCP_TRY_ASSIGN(surface.shell, buildShell(base, tileEdge(base) * asset.extent.z, asset.extent));
     surface.lift = shadowLift(*surface.arrays, tileEdge(base));
     Drawn drawn{.model = nullptr, .row = {}, .renderer = nullptr, .request = {}, .ns = {}};
@@ -134,9 +139,9 @@ Result<Drawn> drawnBy(const Subject& subject, const Transferred* light, const st
     row.light = light != nullptr ? "everywhere" : "local";
     row.prisms = base.triangles.size();
     FrameRequest& request = drawn.request;
-    request.width = kAcross, request.height = kDown;
+    request.width = options.across, request.height = options.down;
     request.camera = fitCamera(surface.shell.low, surface.shell.high, glm::normalize(glm::dvec3(-0.5, 0.7, -0.4)),
-                               {0, 0, 1}, 0.6, double(kAcross) / kDown);
+                               {0, 0, 1}, 0.6, double(options.across) / options.down);
     if (light != nullptr) {
         surface.transfer = light->volume, surface.baseTransfer = light->base;
         request.shading.environment = environmentNamed(kSky);
@@ -146,9 +151,9 @@ Result<Drawn> drawnBy(const Subject& subject, const Transferred* light, const st
         request.shading.lightDirection = glm::normalize(glm::vec3(0.5f, -0.4f, 0.75f));
         request.shading.shadows = true;
     }
-    RendererOptions options;
-    options.device = device;
-    VCP_TRY_ASSIGN(drawn.renderer, createPictureRenderer(options));
+    RendererOptions with;
+    with.device = options.device;
+    VCP_TRY_ASSIGN(drawn.renderer, createPictureRenderer(with));
     VCP_TRY(drawn.renderer->setSurfaces(std::span(&surface, 1)));
     return drawn;
 }
@@ -224,40 +229,40 @@ void compareRates(const std::vector<Drawn>& all, std::vector<MesoPublished>& pub
 
 }  // namespace
 
-Result<std::vector<MesoModel>> compareMesoModels(const std::string& device, int repetitions,
-                                                 std::vector<MesoPublished>& published, const Progress& progress) {
+Result<std::vector<MesoModel>> compareMesoModels(const MesoModelOptions& options,
+                                                 std::vector<MesoPublished>& published) {
     std::vector<Drawn> all;
     AllArrays arrays;
     for (size_t i = 0; i < kModels.size(); ++i) {
         const Model& model = kModels[i];
         const double part = double(i) / kModels.size();
-        if (progress && !progress(model.base, part)) return Error::cancelled();
+        if (options.progress && !options.progress(model.base, part)) return Error::cancelled();
         Transferred light;
         if (model.globalRate > 0) {
-            VCP_TRY_ASSIGN(light, transferred(model, progress));
+            VCP_TRY_ASSIGN(light, transferred(model, options));
         }
-        for (const char* method : kMethods)
+        for (const char* name : kMethods)
             for (const Transferred* in :
                  {static_cast<const Transferred*>(nullptr), static_cast<const Transferred*>(&light)}) {
                 if (in != nullptr && !light.volume) continue;
-                MethodOptions options;
-                options.name = method;
+                MethodOptions method;
+                method.name = name, method.cells = options.cells;
                 VCP_TRY_ASSIGN(auto drawn,
-                               drawnBy({model.asset, model.base, model.tiles, options}, in, device, arrays, progress));
+                               drawnBy({model.asset, model.base, model.tiles, method}, in, options, arrays));
                 drawn.model = &model;
                 all.push_back(std::move(drawn));
             }
     }
     for (const TableSurface& surface : kSurfaces)
-        for (const MethodOptions& method : tableMethods()) {
-            VCP_TRY_ASSIGN(auto drawn,
-                           drawnBy({"hemispheres", surface.base, 4, method}, nullptr, device, arrays, progress));
+        for (const MethodOptions& method : tableMethods(options.cells)) {
+            VCP_TRY_ASSIGN(auto drawn, drawnBy({"hemispheres", surface.base, 4, method}, nullptr, options, arrays));
             all.push_back(std::move(drawn));
         }
     // In rounds over all, so that whatever else the machine does falls on each; the first is a warm-up.
-    for (int round = 0; round <= repetitions; ++round)
+    for (int round = 0; round <= options.repetitions; ++round)
         for (Drawn& each : all) {
-            if (progress && !progress("frames of models", double(round) / (repetitions + 1))) return Error::cancelled();
+            if (options.progress && !options.progress("frames of models", double(round) / (options.repetitions + 1)))
+                return Error::cancelled();
             VCP_TRY(draw(each, round > 0));
         }
     std::vector<MesoModel> rows;

@@ -151,37 +151,6 @@ std::vector<MesoPublished> publishedOf(const std::vector<BenchMesoRow>& rows) {
     return published;
 }
 
-std::vector<MesoHeadline> headlinesOf(const std::vector<BenchMesoRow>& rows) {
-    struct Sum {
-        std::string asset, method, knob;
-        double wrong = 0, worstP95 = 0, fetches = 0, ratio = 0, views = 0;
-    };
-    std::vector<Sum> sums;
-    for (const BenchMesoRow& row : rows) {
-        const auto isOf = [&](const Sum& s) {
-            return s.asset == row.asset && s.method == row.method && s.knob == row.knob;
-        };
-        auto sum = std::ranges::find_if(sums, isOf);
-        if (sum == sums.end()) sum = sums.insert(sum, Sum{row.asset, row.method, row.knob});
-        sum->wrong += row.shape.wrong(), sum->worstP95 = std::max(sum->worstP95, row.shape.p95);
-        sum->fetches += row.fetchesMean, sum->ratio += row.ratioToPeer, ++sum->views;
-    }
-    std::vector<MesoHeadline> headlines;
-    for (const Sum& sum : sums) {
-        if (sum.wrong / sum.views > 1e-3 || sum.worstP95 > 0.25) continue;
-        const double fetches = sum.fetches / sum.views, ratio = sum.ratio / sum.views;
-        const auto isOf = [&](const MesoHeadline& h) { return h.asset == sum.asset && h.method == sum.method; };
-        const auto found = std::ranges::find_if(headlines, isOf);
-        if (found == headlines.end()) {
-            headlines.push_back({sum.asset, sum.method, sum.knob, sum.knob, fetches, ratio});
-            continue;
-        }
-        if (fetches < found->fetches) found->fetches = fetches, found->fetchesKnob = sum.knob;
-        if (ratio < found->ratioToPeer) found->ratioToPeer = ratio, found->timeKnob = sum.knob;
-    }
-    return headlines;
-}
-
 std::string benchMesoJson(const BenchMesoReport& report) {
     Json checks = Json::array();
     for (const MesoCheck& check : report.checks)
@@ -208,6 +177,21 @@ std::string benchMesoJson(const BenchMesoReport& report) {
                              {"fetches_knob", h.fetchesKnob},
                              {"ratio_to_peer", h.ratioToPeer},
                              {"ratio_knob", h.timeKnob}});
+    Json goals = Json::array();
+    for (const MesoGoal& g : goalsOf(report.rows))
+        goals.push_back({{"asset", g.asset},
+                         {"rival", g.rival},
+                         {"rival_knob", g.rivalKnob},
+                         {"rival_is_right", g.rivalIsRight},
+                         {"rival_wrong", g.rivalWrong},
+                         {"rival_p95_texels", g.rivalP95},
+                         {"knob", g.oursKnob},
+                         {"wrong", g.oursWrong},
+                         {"p95_texels", g.oursP95},
+                         {"time_over_rival", g.time},
+                         {"fetches_over_rival", g.fetches},
+                         {"right_knob", g.rightKnob},
+                         {"right_time_over_rival", g.rightKnob.empty() ? Json() : Json(g.rightTime)}});
     Json factors = Json::array();
     for (const MesoFactors& f : report.factors)
         factors.push_back({{"asset", f.asset},
@@ -218,6 +202,16 @@ std::string benchMesoJson(const BenchMesoReport& report) {
                            {"rms_points", f.rmsPoints},
                            {"off_by_a_point", f.offByPoint},
                            {"wrong_hits", f.wrongHits}});
+    Json shadows = Json::array();
+    for (const MesoShadows& s : report.shadows)
+        shadows.push_back({{"asset", s.asset},
+                           {"method", s.method},
+                           {"offset_points", s.offsetPoints},
+                           {"own_hits", s.ownHits},
+                           {"places", s.places},
+                           {"dark", s.dark},
+                           {"leak", s.leak},
+                           {"acne", s.acne}});
     Json lights = Json::array();
     for (const MesoLight& l : report.lights)
         lights.push_back({{"asset", l.asset},
@@ -291,11 +285,10 @@ std::string benchMesoJson(const BenchMesoReport& report) {
                             {"triangles", row.triangles},
                             {"ms", row.ms},
                             {"processor_ms", row.processorMs}});
-    return Json{{"rows", rowsOf(report)}, {"headline", headlines},
-                {"checks", checks},       {"published", published},
-                {"factors", factors},     {"lights", lights},
-                {"prisms", prisms},       {"models", models},
-                {"remeshed", remeshed},   {"remeshed_pictures", pictures}}
+    return Json{{"rows", rowsOf(report)}, {"headline", headlines},  {"goals", goals},
+                {"checks", checks},       {"published", published}, {"factors", factors},
+                {"shadows", shadows},     {"lights", lights},       {"prisms", prisms},
+                {"models", models},       {"remeshed", remeshed},   {"remeshed_pictures", pictures}}
         .dump();
 }
 
@@ -327,6 +320,18 @@ std::string benchMesoMarkdown(const BenchMesoReport& report) {
             text += fmt::format("| {} | {} | {:.1f} | {} | {:.3f} | {} |\n", h.asset, h.method, h.fetches,
                                 h.fetchesKnob, h.ratioToPeer, h.timeKnob);
     }
+    if (const auto goals = goalsOf(report.rows); !goals.empty()) {
+        text +=
+            "\n| asset | rival, its cheapest right knob, or its rightest | wrong % | p95 | boxes, as right | wrong % | "
+            "p95 | time over the rival's | fetches | boxes with <= 0.1 %, 0.25 texels | time over the rival's "
+            "|\n|---|---|---|---|---|---|---|---|---|---|---|\n";
+        for (const MesoGoal& g : goals)
+            text +=
+                fmt::format("| {} | {} {}{} | {:.3f} | {:.3f} | {} | {:.3f} | {:.3f} | {:.2f} | {:.2f} | {} | {} |\n",
+                            g.asset, g.rival, g.rivalKnob, g.rivalIsRight ? " (right)" : "", 100 * g.rivalWrong,
+                            g.rivalP95, g.oursKnob, 100 * g.oursWrong, g.oursP95, g.time, g.fetches, g.rightKnob,
+                            g.rightKnob.empty() ? std::string() : fmt::format("{:.2f}", g.rightTime));
+    }
     if (!report.published.empty()) {
         text +=
             "\n| published | asset | ratio there | of | ours | within 25 % | ours, times "
@@ -343,6 +348,15 @@ std::string benchMesoMarkdown(const BenchMesoReport& report) {
         for (const MesoFactors& f : report.factors)
             text += fmt::format("| {} | {} | {} | {} | {:.3f} | {:.3f} | {:.1f} | {:.1f} |\n", f.asset, f.form, f.rank,
                                 f.clusters, double(f.bytes) * 1e-6, f.rmsPoints, 100 * f.offByPoint, 100 * f.wrongHits);
+    }
+    if (!report.shadows.empty()) {
+        text +=
+            "\n| asset | shadows by | from | offset, points | places | dark % | leak % | acne % "
+            "|\n|---|---|---|---|---|---|---|---|\n";
+        for (const MesoShadows& s : report.shadows)
+            text += fmt::format("| {} | {} | {} | {:.3g} | {} | {:.1f} | {:.2f} | {:.2f} |\n", s.asset, s.method,
+                                s.ownHits ? "its own hits" : "the surface", s.offsetPoints, s.places, 100 * s.dark,
+                                100 * s.leak, 100 * s.acne);
     }
     if (!report.lights.empty()) {
         text +=

@@ -290,6 +290,8 @@ RunCommand addBenchMeso(CLI::App& bench) {
     app->add_flag("--sweep", options.sweep, "Each method at several values of its knob");
     app->add_flag("--factors", options.factors,
                   "Also compare factors of displacement maps, published and clustered, with the distances");
+    app->add_flag("--shadows", options.shadows,
+                  "Also compare shadows by displacement maps, asked from several heights, with the surface's own");
     app->add_flag(
         "--light", options.light,
         "Also compare light from everywhere on a tile, and on two bases, in the three skies, with a path tracer");

@@ -132,6 +132,27 @@ TEST(GdmMarch, SaysAtSamplesWhatTheTableSays) {
     }
 }
 
+/// Over steep height fields the field is far less than the distance; the density is not.
+TEST(GdmMap, DensityIsAHalfOnTheSurfaceAndGoneAPointOffIt) {
+    const HeightMap map = *makeHeightField("hemispheres", 64, 1);
+    const auto shape = test::heights(map);
+    const glm::ivec3 points{24, 24, 9};
+    const auto volume = *sampleProperties(*shape, points);
+    const glm::dvec3 spacing = shape->extent() / glm::dvec3(points.x, points.y, points.z - 1);
+    const double widest = std::max({spacing.x, spacing.y, spacing.z});
+    int empty = 0, full = 0, between = 0;
+    for (int i = 0; i < points.x * points.y * points.z; ++i) {
+        const glm::dvec3 p = glm::dvec3(i % points.x, i / points.x % points.y, i / points.x / points.y) * spacing;
+        const double off = shape->distance(p, 2 * widest), density = double(volume.texels[size_t(i)] >> 24) / 255;
+        const bool inside = shape->field(p) <= 0;
+        EXPECT_NEAR(density, std::clamp(0.5 + (inside ? off : -off) / (2 * widest), 0.0, 1.0), 0.02) << i;
+        (density == 0 ? empty : density == 1 ? full : between) += 1;
+    }
+    EXPECT_GT(empty, 100);
+    EXPECT_GT(full, 10);
+    EXPECT_GT(between, 100);
+}
+
 /// Many slices find a plane where it is; few find it as far off as they are apart.
 TEST(GdmMarch, SlicesComeNearerTheMoreThereAre) {
     const auto shape = test::solid("beads");
