@@ -22,7 +22,7 @@ using glm::dvec2, glm::dvec3, glm::dvec4;
 
 constexpr uint64_t kMostPatches = uint64_t{1} << 22;
 // Where there would be more, patches are no smaller where the map is steep.
-constexpr uint64_t kMostSmallPatches = uint64_t{1} << 20;
+constexpr uint64_t kMostSmallPatches = uint64_t{3} << 19;
 // Patches are wider where there are more than so many.
 constexpr double kManyPatches = 1 << 17;
 constexpr int kLog2Narrowest = 4, kLog2Widest = 8;  // texels of a patch's edge
@@ -31,8 +31,10 @@ constexpr int kLog2MostCells = 9;                   // of a patch's edge; two mo
 // What is known of a kind of patches is forgotten where it is more than so many combinations of steps, and one for
 // each.
 constexpr size_t kMostKnown = 64;
-// Cells are not halved where no edge of a triangle is longer.
-constexpr double kNarrowestPixels = 0.125;
+// Cells are not halved where no edge of a triangle is longer; where a view would have more cells, they are less narrow,
+// and less is certified.
+constexpr double kNarrowestPixels = 0.125, kLeastNarrowPixels = 1;
+constexpr double kMostCells = 1 << 23;
 constexpr double kNothing = std::numeric_limits<double>::infinity();
 
 float roundedUp(double x) { return std::nextafter(float(x), std::numeric_limits<float>::infinity()); }
@@ -62,9 +64,10 @@ struct CertifiedCells::Scratch {
 /// A camera, and the corners of the patches in its eye space.
 struct CertifiedCells::View {
     const RemeshCamera& camera;
-    double cell;      ///< pixels
-    dvec4 picture;    ///< what is seen: left, lower, right, upper
-    double steepest;  ///< of the slopes that are seen, sqrt(1 + x^2 + y^2)
+    double cell;       ///< pixels
+    dvec4 picture;     ///< what is seen: left, lower, right, upper
+    double steepest;   ///< of the slopes that are seen, sqrt(1 + x^2 + y^2)
+    double narrowest;  ///< pixels: triangles' edges of cells that are not halved
     std::vector<dvec3> positions, directions;
 };
 
@@ -433,7 +436,7 @@ int CertifiedCells::wantedStep(const View& view, size_t patch, Seen& seen, doubl
         seen.canKeep = keeps(view, patch, seen, cells, allowed, scratch);
         if (seen.canKeep) return step;
         const Reach reach = reachOf(view, patch, seen, known(patch, seen, cells, allowed, scratch));
-        if (pixels(seen, 0, 0, reach) < kNarrowestPixels) break;
+        if (pixels(seen, 0, 0, reach) < view.narrowest) break;
     }
     return std::min(seen.pixel, finest_);
 }
@@ -455,7 +458,7 @@ void CertifiedCells::refine(size_t patch, std::vector<uint32_t>& open) {
 Result<void> CertifiedCells::choose(const RemeshCamera& camera, const RemeshOptions& options, RemeshCounts& counts) {
     const dvec4 s = camera.picture.value_or(camera.seen);
     const dvec2 farthest = glm::max(glm::abs(dvec2(s.x, s.y)), glm::abs(dvec2(s.z, s.w)));
-    View view{camera, options.cell, s, std::sqrt(1 + glm::dot(farthest, farthest)), {}, {}};
+    View view{camera, options.cell, s, std::sqrt(1 + glm::dot(farthest, farthest)), kNarrowestPixels, {}, {}};
     const auto turned = [&](dvec3 v) {
         return dvec3(glm::dot(v, camera.right), glm::dot(v, camera.up), glm::dot(v, camera.forward));
     };
@@ -477,11 +480,22 @@ Result<void> CertifiedCells::choose(const RemeshCamera& camera, const RemeshOpti
         for (const Kind& kind : kinds_) sum += kind.looked;
         return sum;
     };
+    const auto cellsWanted = [&] {
+        double sum = 0;
+        for (size_t i = 0; i < seen_.size(); ++i) {
+            const glm::dvec2 a = grids_[i][1] - grids_[i][0], b = grids_[i][2] - grids_[i][0];
+            if (seen_[i].is) sum += 0.5 * std::abs(a.x * b.y - a.y * b.x) * std::exp2(-2 * wanted_[i]);
+        }
+        return sum;
+    };
     const uint64_t before = lookedAt();
-    if (!options.shareOut)
-        wantSteps(0, kinds_.size());
-    else if (!options.shareOut(kinds_.size(), wantSteps))
-        return Error::cancelled();
+    for (;; view.narrowest *= 2) {
+        if (!options.shareOut)
+            wantSteps(0, kinds_.size());
+        else if (!options.shareOut(kinds_.size(), wantSteps))
+            return Error::cancelled();
+        if (view.narrowest >= kLeastNarrowPixels || cellsWanted() <= kMostCells) break;
+    }
     std::ranges::fill(edgeSteps_, coarsest_);
     std::vector<uint32_t> open;
     Scratch scratch;
