@@ -273,12 +273,12 @@ TEST_F(RemeshedSurfaces, ShadeWhatIsBelowThem) {
 /// A cube from 4 to 12, from above: over it, within it and beside it lies a remeshed plateau of 2 x 2 units.
 TEST_F(RemeshedSurfaces, NearerOfDatasetAndSurfaceIsSeenAndShadesTheOther) {
     const auto plateauAt = [](glm::dvec3 place) {
-        MesoSurface made = test::mesoSurface(test::plateau(), "pyramid", "quad", 1, 2, place);
+        MesoSurface made = vcp::test::mesoSurface(vcp::test::plateau(), "pyramid", "quad", 1, 2, place);
         made.remeshed = surfaceOf(plateau(), "quad", 1, 1, place).remeshed;
         made.remeshed.options.errorPixels = 0.5;
         return made;
     };
-    const test::Scene cube = test::cubeScene(0);
+    const vcp::test::Scene cube = vcp::test::cubeScene(0);
     const auto pixelOf = [](double x) { return size_t(kEdge / 2) * kEdge + size_t(x / 16 * kEdge); };
     for (const uint32_t occlusionRays : {0u, 1u}) {
         SCOPED_TRACE(occlusionRays);
