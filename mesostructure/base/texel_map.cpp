@@ -120,6 +120,18 @@ Error wrong(size_t triangle, std::string message) {
             .element = fmt::format("triangle {}", triangle)};
 }
 
+/// Moves all corners to the nearest texels, where that changes no triangle much.
+void moveToTexels(TexelMap& map) {
+    constexpr double kMostChanged = 0.1;  // of its area
+    std::vector<Places> moved = map.places;
+    for (size_t i = 0; i < moved.size(); ++i) {
+        for (dvec2& p : moved[i]) p = glm::floor(p + 0.5);
+        const double area = twiceAreaOf(map.places[i]);
+        if (std::abs(twiceAreaOf(moved[i]) - area) > kMostChanged * std::abs(area)) return;
+    }
+    map.places = std::move(moved);
+}
+
 }  // namespace
 
 double areaOf(const BaseSurface& surface, size_t triangle) {
@@ -176,7 +188,9 @@ Result<TexelMap> givenMap(const BaseSurface& surface, int size) {
         }
         if (!(std::abs(twiceAreaOf(map.places[i])) > 1e-9) && areaOf(surface, i) > 0)
             return wrong(i, "its texture coordinates have no area; unwrap it, or have a new map made");
+        for (dvec2& p : map.places[i]) p = glm::clamp(p, 0.0, double(size - 1));
     }
+    moveToTexels(map);
     return map;
 }
 

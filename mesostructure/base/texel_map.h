@@ -44,7 +44,10 @@ inline constexpr int kLeastChartSteps = 2, kMostChartSteps = 1024;
 Result<TexelMap> makeAtlas(const BaseSurface& surface, int size);
 
 /// Takes the surface's own coordinates, from 0 to 1, as other programs do: the middle of the texel at the lower left
-/// is (0.5, 0.5) / size. Errors: InvalidInput, with the triangle (coordinates that are missing, not finite, outside of
+/// is (0.5, 0.5) / size. Corners within half a texel of the map's border are moved to its outermost texels, for height
+/// maps repeat: beyond lie the texels of the opposite border. Where triangles are large, all corners are moved to the
+/// nearest texels: along the edges of the base heights bend as sharply as it does, which they can from texel to texel.
+/// Errors: InvalidInput, with the triangle (coordinates that are missing, not finite, outside of
 /// 0 to 1, or without an area although the triangle has one).
 Result<TexelMap> givenMap(const BaseSurface& surface, int size);
 

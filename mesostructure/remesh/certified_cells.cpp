@@ -10,6 +10,7 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
+#include "mesostructure/remesh/height_bends.h"
 #include "mesostructure/remesh/height_deviation.h"
 #include "mesostructure/remesh/piece_maker.h"
 
@@ -20,6 +21,8 @@ namespace {
 using glm::dvec2, glm::dvec3, glm::dvec4;
 
 constexpr uint64_t kMostPatches = uint64_t{1} << 22;
+// Where there would be more, patches are no smaller where the map is steep.
+constexpr uint64_t kMostSmallPatches = uint64_t{3} << 19;
 // Patches are wider where there are more than so many.
 constexpr double kManyPatches = 1 << 17;
 constexpr int kLog2Narrowest = 4, kLog2Widest = 8;  // texels of a patch's edge
@@ -28,8 +31,13 @@ constexpr int kLog2MostCells = 9;                   // of a patch's edge; two mo
 // What is known of a kind of patches is forgotten where it is more than so many combinations of steps, and one for
 // each.
 constexpr size_t kMostKnown = 64;
-constexpr double kNarrowestPixels = 0.5;  // of a cell
+// Cells are not halved where no edge of a triangle is longer; where a view would have more cells, they are less narrow,
+// and less is certified.
+constexpr double kNarrowestPixels = 0.125, kLeastNarrowPixels = 1;
+constexpr double kMostCells = 1 << 23;
 constexpr double kNothing = std::numeric_limits<double>::infinity();
+
+float roundedUp(double x) { return std::nextafter(float(x), std::numeric_limits<float>::infinity()); }
 
 /// Returns log2 of the texels along a patch's edge.
 int patchEdge(const RemeshSurface& surface) {
@@ -50,14 +58,16 @@ int patchEdge(const RemeshSurface& surface) {
 struct CertifiedCells::Scratch {
     RemeshMesh<double> mesh;
     std::vector<std::array<HeightCorner, 3>> over;  ///< its triangles, over the map
+    bool mayJump = false;                           ///< corners may be higher than the patch's own map
 };
 
 /// A camera, and the corners of the patches in its eye space.
 struct CertifiedCells::View {
     const RemeshCamera& camera;
-    double cell;      ///< pixels
-    dvec4 picture;    ///< what is seen: left, lower, right, upper
-    double steepest;  ///< of the slopes that are seen, sqrt(1 + x^2 + y^2)
+    double cell;       ///< pixels
+    dvec4 picture;     ///< what is seen: left, lower, right, upper
+    double steepest;   ///< of the slopes that are seen, sqrt(1 + x^2 + y^2)
+    double narrowest;  ///< pixels: triangles' edges of cells that are not halved
     std::vector<dvec3> positions, directions;
 };
 
@@ -66,7 +76,11 @@ Result<CertifiedCells> CertifiedCells::create(const RemeshSurface& surface) {
     const int edge = patchEdge(surface);
     made.finest_ = std::min(kLog2FinestCells, kLog2MostCells - edge);
     made.coarsest_ = edge + made.finest_;
-    VCP_TRY_ASSIGN(made.patches_, cutSurface(surface, std::exp2(edge), kMostPatches));
+    const HeightBends bends(*surface.heights);
+    auto cut =
+        cutSurface(surface, {.mostTexels = std::exp2(edge), .bends = &bends, .mostTriangles = kMostSmallPatches});
+    if (!cut) cut = cutSurface(surface, {.mostTexels = std::exp2(edge), .mostTriangles = kMostPatches});
+    VCP_TRY_ASSIGN(made.patches_, std::move(cut));
     const dvec2 texels = surface.heights->texels() * std::exp2(made.finest_);
     for (const auto& uvs : made.patches_.uvs) {
         std::array<dvec2, 3> at;
@@ -134,7 +148,7 @@ void CertifiedCells::addKinds() {
         // What is beyond a seam is not in the key.
         if (mayJump) key.assign(1, i);
         const auto [found, isNew] = numbers.try_emplace(std::move(key), uint32_t(kinds_.size()));
-        if (isNew) kinds_.emplace_back();
+        if (isNew) kinds_.emplace_back().mayJump = mayJump;
         kindOf_[i] = found->second;
         kinds_[found->second].patches.push_back(i);
     }
@@ -163,7 +177,29 @@ std::array<glm::ivec3, 3> CertifiedCells::corners(size_t patch, int step) const 
     return at;
 }
 
-CertifiedCells::Seen CertifiedCells::seenIn(const View& view, size_t patch) const {
+/// Returns between which heights a patch lies: those of the texels about it, and all where the map may jump.
+std::pair<double, double> CertifiedCells::rangeOf(size_t patch) {
+    Kind& kind = kinds_[kindOf_[patch]];
+    if (kind.lowest > kind.highest) {
+        const HeightLevel& map = patches_.heights->levels().front();
+        dvec2 low(kNothing), high(-kNothing);
+        for (const glm::vec2 uv : patches_.uvs[patch]) {
+            low = glm::min(low, dvec2(uv) * patches_.heights->texels());
+            high = glm::max(high, dvec2(uv) * patches_.heights->texels());
+        }
+        const glm::ivec2 first(glm::floor(low)), last(glm::ceil(high));
+        uint16_t lowest = 65535, highest = 0;
+        for (int j = first.y; j <= last.y && !kind.mayJump; ++j)
+            for (int i = first.x; i <= last.x; ++i) {
+                const size_t at = size_t(wrapped(i, map.size.x)) + size_t(map.size.x) * size_t(wrapped(j, map.size.y));
+                lowest = std::min(lowest, map.texels[at]), highest = std::max(highest, map.texels[at]);
+            }
+        kind.lowest = kind.mayJump ? 0 : lowest / 65535.0, kind.highest = kind.mayJump ? 1 : highest / 65535.0;
+    }
+    return {kind.lowest, kind.highest};
+}
+
+CertifiedCells::Seen CertifiedCells::seenIn(const View& view, size_t patch) {
     const RemeshCamera& camera = view.camera;
     std::array<dvec3, 3> directions;
     std::array<dvec3, 6> hull;
@@ -175,8 +211,13 @@ CertifiedCells::Seen CertifiedCells::seenIn(const View& view, size_t patch) cons
         longest = std::max(longest, glm::length(directions[k]));
     }
     if (isOutsideView(camera, view.picture, hull)) return {};
-    Seen seen{.is = true};
-    limitSteps(view, patch, seen);
+    const auto [lowest, highest] = rangeOf(patch);
+    for (size_t k = 0; k < 3; ++k) {
+        hull[k] = view.positions[patches_.triangles[patch][k]] + lowest * directions[k];
+        hull[k + 3] = hull[k] + (highest - lowest) * directions[k];
+    }
+    Seen seen{.is = true, .lowest = lowest, .highest = highest};
+    choosePixelStep(view, patch, seen);
     if (camera.isParallel) {
         for (const dvec3& d : directions)
             seen.perHeight = std::max(seen.perHeight, camera.focal * glm::length(dvec2(d)));
@@ -186,19 +227,20 @@ CertifiedCells::Seen CertifiedCells::seenIn(const View& view, size_t patch) cons
     dvec3 low(kNothing), high(-kNothing);
     for (const dvec3& p : hull) low = glm::min(low, p), high = glm::max(high, p);
     const dvec4 s = view.picture;
-    dvec2 lowest(s.x, s.y), highest(s.z, s.w);
+    dvec2 leftLow(s.x, s.y), rightHigh(s.z, s.w);
     if (low.z > 0) {
         dvec2 least(kNothing), most(-kNothing);
         for (const dvec3& p : hull) least = glm::min(least, dvec2(p) / p.z), most = glm::max(most, dvec2(p) / p.z);
-        lowest = glm::clamp(least, lowest, highest), highest = glm::clamp(most, lowest, highest);
+        leftLow = glm::clamp(least, leftLow, rightHigh), rightHigh = glm::clamp(most, leftLow, rightHigh);
     }
     // Two points of one place lie at depths from low.z on; and what is seen is no nearer than the box about the patch.
     seen.depth = low.z;
     const double away = glm::length(glm::max(glm::max(low, -high), dvec3(0))),
                  least = std::max(away / view.steepest, camera.nearest);
     if (least > seen.depth) seen.depth = least, seen.nearer = longest;
-    for (const double x : {lowest.x, highest.x})
-        for (const double y : {lowest.y, highest.y}) {
+    seen.tangents = dvec4(leftLow, rightHigh);
+    for (const double x : {leftLow.x, rightHigh.x})
+        for (const double y : {leftLow.y, rightHigh.y}) {
             const dvec2 t(x, y);
             for (const dvec3& d : directions)
                 seen.perHeight = std::max(seen.perHeight, camera.focal * glm::length(dvec2(d) - t * d.z));
@@ -207,12 +249,12 @@ CertifiedCells::Seen CertifiedCells::seenIn(const View& view, size_t patch) cons
     return seen;
 }
 
-double CertifiedCells::pixels(const Seen& seen, double height, double across) const {
-    const double depth = seen.nearer > 0 ? seen.depth - seen.nearer * height - across : seen.depth;
-    return depth > 0 ? (seen.perHeight * height + seen.perUnit * across) / depth : kNothing;
+double CertifiedCells::pixels(const Seen& seen, double height, double across, const Reach& reach) const {
+    const double depth = seen.nearer > 0 ? seen.depth - seen.nearer * height - across - reach.length : seen.depth;
+    return depth > 0 ? (seen.perHeight * height + seen.perUnit * across + reach.pixels) / depth : kNothing;
 }
 
-void CertifiedCells::limitSteps(const View& view, size_t patch, Seen& seen) const {
+void CertifiedCells::choosePixelStep(const View& view, size_t patch, Seen& seen) const {
     dvec3 middle(0);
     double density = 0;
     for (const uint32_t corner : patches_.triangles[patch]) {
@@ -221,68 +263,91 @@ void CertifiedCells::limitSteps(const View& view, size_t patch, Seen& seen) cons
     }
     const double depth = view.camera.isParallel ? 1 : std::max(middle.z, view.camera.nearest);
     const double texels = depth / view.camera.focal * density;  // of a pixel
-    const auto stepOf = [&](double pixels) {
-        return std::clamp(finest_ + int(std::floor(std::log2(std::clamp(pixels * texels, 1e-6, 1e6)))), 0, coarsest_);
-    };
-    // Normals are those of pixels, whatever the triangle: cells are as wide as their error allows.
-    seen.pixel = stepOf(view.cell), seen.widest = coarsest_, seen.narrowest = stepOf(kNarrowestPixels);
+    seen.pixel = finest_ + int(std::floor(std::log2(std::clamp(view.cell * texels, 1e-6, 1e6))));
+    seen.pixel = std::clamp(seen.pixel, 0, coarsest_);
 }
 
-void CertifiedCells::measure(Kind& kind, Known& known, double enough, Scratch& scratch) const {
-    const size_t patch = kind.patches.front();
+void CertifiedCells::sweepOver(size_t patch, const PatchCells& cells, Scratch& scratch) const {
     // The sweep moves places as it moves directions; where these lie in the place of those, they come out as they are.
     RemeshPiece<double> piece;
-    bool mayJump = false;
-    const auto corners = this->corners(patch, known.cells.step);
+    scratch.mayJump = false;
+    const auto corners = this->corners(patch, cells.step);
     for (size_t k = 0; k < 3; ++k) {
         const uint32_t corner = patches_.triangles[patch][k];
         auto& to = piece.corners[k];
         to.position = dvec3(patches_.directions[corner]), to.direction = dvec3(0);
         to.grid = corners[k], to.uv = dvec2(patches_.uvs[patch][k]);
         to.density = 0, to.height = heights_[corner], to.weight = 1;
-        mayJump = mayJump || patches_.firstPlace[corner + 1] - patches_.firstPlace[corner] > 1;
+        scratch.mayJump = scratch.mayJump || patches_.firstPlace[corner + 1] - patches_.firstPlace[corner] > 1;
         if (const uint32_t seam = patches_.seams[patch][k]; seam != RemeshSurface::kNoSeam)
             piece.seams[k] = {true, dvec2(patches_.seamUvs[seam][0]), dvec2(patches_.seamUvs[seam][1])};
     }
-    piece.parts = known.cells.parts;
-    scratch.mesh.clear();
+    piece.parts = cells.parts;
+    scratch.mesh.clear(), scratch.over.clear();
     const RemeshMath<double>::RemeshView flat{{1, 1, 1, 1}, 0, RemeshMath<double>::kRemeshMap};
     PieceSweep<double> sweep(patches_, {}, flat, scratch.mesh);
     sweep.sweep(piece);
-    double across = 0, jump = 0;
-    DeviationSearch search{.enough = enough};
-    std::vector<std::array<HeightCorner, 3>>& triangles = scratch.over;
-    triangles.clear();
     for (size_t i = 0; i < scratch.mesh.indices.size(); i += 3) {
-        auto& at = triangles.emplace_back();
-        std::array<dvec3, 3> directions;
-        double least = kNothing, most = -kNothing;
+        auto& at = scratch.over.emplace_back();
         for (size_t k = 0; k < 3; ++k) {
             const uint32_t number = scratch.mesh.indices[i + k];
             at[k] = {scratch.mesh.vertices[number].uv, sweep.heights()[number]};
-            directions[k] = scratch.mesh.vertices[number].position;
-            least = std::min(least, at[k].height), most = std::max(most, at[k].height);
-            if (!mayJump) continue;
-            const double own = patches_.heights->height(0, at[k].at);
-            jump = std::max(jump, at[k].height - own), at[k].height = own;
         }
+    }
+}
+
+void CertifiedCells::measure(Kind& kind, Known& known, double enough, Scratch& scratch) const {
+    sweepOver(kind.patches.front(), known.cells, scratch);
+    double across = 0, jump = 0;
+    std::array<double, 4> reach{};
+    DeviationSearch search{.enough = enough};
+    const dvec2 texels = patches_.heights->texels();
+    for (size_t i = 0; i < scratch.over.size(); ++i) {
+        auto& at = scratch.over[i];
+        const auto [least, most] = std::minmax({at[0].height, at[1].height, at[2].height});
         double apart = 0;
-        for (size_t k = 0; k < 3; ++k) apart = std::max(apart, glm::distance(directions[k], directions[(k + 1) % 3]));
+        for (size_t k = 0; k < 3; ++k) {
+            const auto cornerOf = [&](size_t c) { return scratch.mesh.vertices[scratch.mesh.indices[3 * i + c % 3]]; };
+            apart = std::max(apart, glm::distance(cornerOf(k).position, cornerOf(k + 1).position));
+            const dvec2 edge = (at[(k + 1) % 3].at - at[k].at) * texels;
+            const std::array<double, 4> along{edge.x, edge.y, edge.x + edge.y, edge.x - edge.y};
+            for (size_t n = 0; n < 4; ++n) reach[n] = std::max(reach[n], std::abs(along[n]));
+        }
         across = std::max(across, 0.25 * (most - least) * apart);
+        if (scratch.mayJump)
+            for (HeightCorner& corner : at) {
+                const double own = patches_.heights->height(0, corner.at);
+                jump = std::max(jump, corner.height - own), corner.height = own;
+            }
         // Of steps that are too wide most are so at the middle of a triangle already.
         const dvec2 middle = (at[0].at + at[1].at + at[2].at) / 3.0;
         search.known = std::max(search.known, std::abs(patches_.heights->height(0, middle) -
                                                        (at[0].height + at[1].height + at[2].height) / 3));
         ++search.looked;
     }
-    for (size_t i = 0; i < triangles.size() && !(search.known > enough); ++i)
-        search.known = heightDeviation(*patches_.heights, triangles[i], search);
+    for (size_t i = 0; i < scratch.over.size() && !(search.known > enough); ++i)
+        search.known = heightDeviation(*patches_.heights, scratch.over[i], search);
     const double height = search.known;
     known.isWhole = !(height > enough), kind.looked += search.looked;
     // Rounded up, so that what is kept in single precision is no less.
-    known.height = std::nextafter(float(height), 2.0f);
-    known.jump = std::nextafter(float(jump), 2.0f);
-    known.across = std::nextafter(float(across), std::numeric_limits<float>::infinity());
+    known.height = roundedUp(height), known.jump = roundedUp(jump), known.across = roundedUp(across);
+    for (size_t n = 0; n < 4; ++n) known.reach[n] = roundedUp(reach[n]);
+}
+
+void CertifiedCells::measureBeyond(Kind& kind, Known& known, double enough, Scratch& scratch) const {
+    sweepOver(kind.patches.front(), known.cells, scratch);
+    double beyond = 0;
+    for (auto& at : scratch.over) {
+        // How far heights are from the middle of the corners' says how far they are beyond them.
+        const auto [least, most] = std::minmax({at[0].height, at[1].height, at[2].height});
+        const double middle = 0.5 * (least + most), half = 0.5 * (most - least);
+        for (HeightCorner& corner : at) corner.height = middle;
+        DeviationSearch search{.known = half + beyond, .enough = half + enough};
+        beyond = std::max(beyond, heightDeviation(*patches_.heights, at, search) - half);
+        kind.looked += search.looked;
+        if (beyond > enough) break;
+    }
+    known.isBeyondWhole = !(beyond > enough), known.beyond = roundedUp(beyond);
 }
 
 CertifiedCells::Known& CertifiedCells::known(size_t patch, const Seen& seen, const PatchCells& cells, double allowed,
@@ -301,19 +366,79 @@ CertifiedCells::Known& CertifiedCells::known(size_t patch, const Seen& seen, con
     return *found;
 }
 
-bool CertifiedCells::keeps(size_t patch, const Seen& seen, const PatchCells& cells, double allowed, Scratch& scratch) {
-    const Known& of = known(patch, seen, cells, allowed, scratch);
-    if (!of.isWhole) return false;
-    const double height = double(of.height), jump = double(of.jump), across = double(of.across);
-    if (pixels(seen, height + jump, across) <= allowed) return true;
-    // No cells take a jump away; narrow ones keep it where it is.
-    return cells.step <= seen.pixel && pixels(seen, jump, 0) > 0.5 * allowed && pixels(seen, height, across) <= allowed;
+CertifiedCells::Reach CertifiedCells::reachOf(const View& view, size_t patch, const Seen& seen,
+                                              const Known& known) const {
+    const auto& uvs = patches_.uvs[patch];
+    const dvec2 texels = patches_.heights->texels(), a = (dvec2(uvs[1]) - dvec2(uvs[0])) * texels,
+                b = (dvec2(uvs[2]) - dvec2(uvs[0])) * texels;
+    const double area = a.x * b.y - a.y * b.x;
+    if (!(std::abs(area) > 1e-9 * (glm::dot(a, a) + glm::dot(b, b)))) return {kNothing, kNothing};
+    // Where what is lowest and what is highest goes along an edge of a triangle.
+    const auto alongOf = [&](dvec2 edge, double height) {
+        const auto at = [&](size_t k) {
+            const uint32_t corner = patches_.triangles[patch][k];
+            return view.positions[corner] + height * view.directions[corner];
+        };
+        const double x = (edge.x * b.y - edge.y * b.x) / area, y = (a.x * edge.y - a.y * edge.x) / area;
+        return x * (at(1) - at(0)) + y * (at(2) - at(0));
+    };
+    const auto [x, y, sum, difference] = known.reach;
+    Reach reach;
+    for (const dvec2 edge : {dvec2(x, std::min(y, sum - x)), dvec2(std::min(x, sum - y), y),
+                             dvec2(x, -std::min(y, difference - x)), dvec2(std::min(x, difference - y), -y)})
+        for (const double height : {seen.lowest, seen.highest}) {
+            const dvec3 along = alongOf(edge, height);
+            reach.length = std::max(reach.length, glm::length(along));
+            if (view.camera.isParallel) reach.pixels = std::max(reach.pixels, glm::length(dvec2(along)));
+            for (const double left : {seen.tangents.x, seen.tangents.z})
+                for (const double low : {seen.tangents.y, seen.tangents.w})
+                    if (!view.camera.isParallel)
+                        reach.pixels = std::max(reach.pixels, glm::length(dvec2(along) - dvec2(left, low) * along.z));
+        }
+    reach.pixels *= view.camera.focal;
+    return reach;
 }
 
-int CertifiedCells::wantedStep(size_t patch, Seen& seen, double allowed, Scratch& scratch) {
-    for (int step = seen.widest; step >= seen.narrowest; --step)
-        if (seen.canKeep = keeps(patch, seen, evenly(patch, step), allowed, scratch); seen.canKeep) return step;
-    return std::clamp(std::min(seen.pixel, finest_), seen.narrowest, seen.widest);
+double CertifiedCells::errorOf(const View& view, size_t patch, const Seen& seen, const PatchCells& cells,
+                               double allowed, Scratch& scratch) {
+    Known& of = known(patch, seen, cells, allowed, scratch);
+    const double across = double(of.across);
+    if (of.isWhole) {
+        const double error = pixels(seen, double(of.height) + double(of.jump), across, {});
+        if (error <= allowed) return error;
+    }
+    const Reach reach = reachOf(view, patch, seen, of);
+    const double left = allowed - pixels(seen, 0, across, reach);
+    if (!(left >= 0)) return kNothing;
+    const double enough = seen.perHeight > 0 ? 1.01 * left * seen.depth / seen.perHeight : kNothing;
+    if (!of.isBeyondWhole && !(double(of.beyond) > enough)) measureBeyond(kinds_[kindOf_[patch]], of, enough, scratch);
+    if (!of.isBeyondWhole) return kNothing;
+    const double error = pixels(seen, double(of.beyond), across, reach);
+    return error <= allowed ? error : kNothing;
+}
+
+bool CertifiedCells::keeps(const View& view, size_t patch, const Seen& seen, const PatchCells& cells, double allowed,
+                           Scratch& scratch) {
+    if (errorOf(view, patch, seen, cells, allowed, scratch) <= allowed) return true;
+    // Cells that are too wide to take a jump for a wall leave it as it is: narrow ones keep it where it is.
+    const Known& of = known(patch, seen, cells, allowed, scratch);
+    if (cells.step > seen.pixel || !of.isWhole || !(pixels(seen, double(of.jump), 0, {}) > 0.5 * allowed) ||
+        pixels(seen, double(of.height), double(of.across), {}) > allowed)
+        return false;
+    const float finest = std::exp2(-float(finest_));
+    const Known narrowest{.cells = cells, .reach = {finest, finest, 2 * finest, finest}};
+    return pixels(seen, 0, 0, reachOf(view, patch, seen, narrowest)) > 0.75 * allowed;
+}
+
+int CertifiedCells::wantedStep(const View& view, size_t patch, Seen& seen, double allowed, Scratch& scratch) {
+    for (int step = coarsest_; step >= 0; --step) {
+        const PatchCells cells = evenly(patch, step);
+        seen.canKeep = keeps(view, patch, seen, cells, allowed, scratch);
+        if (seen.canKeep) return step;
+        const Reach reach = reachOf(view, patch, seen, known(patch, seen, cells, allowed, scratch));
+        if (pixels(seen, 0, 0, reach) < view.narrowest) break;
+    }
+    return std::min(seen.pixel, finest_);
 }
 
 /// Makes a patch's edges finer by a step: first those that are coarser than its cells.
@@ -333,7 +458,7 @@ void CertifiedCells::refine(size_t patch, std::vector<uint32_t>& open) {
 Result<void> CertifiedCells::choose(const RemeshCamera& camera, const RemeshOptions& options, RemeshCounts& counts) {
     const dvec4 s = camera.picture.value_or(camera.seen);
     const dvec2 farthest = glm::max(glm::abs(dvec2(s.x, s.y)), glm::abs(dvec2(s.z, s.w)));
-    View view{camera, options.cell, s, std::sqrt(1 + glm::dot(farthest, farthest)), {}, {}};
+    View view{camera, options.cell, s, std::sqrt(1 + glm::dot(farthest, farthest)), kNarrowestPixels, {}, {}};
     const auto turned = [&](dvec3 v) {
         return dvec3(glm::dot(v, camera.right), glm::dot(v, camera.up), glm::dot(v, camera.forward));
     };
@@ -347,7 +472,7 @@ Result<void> CertifiedCells::choose(const RemeshCamera& camera, const RemeshOpti
         for (size_t kind = first; kind < last; ++kind)
             for (const uint32_t i : kinds_[kind].patches) {
                 seen_[i] = seenIn(view, i);
-                if (seen_[i].is) wanted_[i] = wantedStep(i, seen_[i], options.errorPixels, scratch);
+                if (seen_[i].is) wanted_[i] = wantedStep(view, i, seen_[i], options.errorPixels, scratch);
             }
     };
     const auto lookedAt = [&] {
@@ -355,11 +480,22 @@ Result<void> CertifiedCells::choose(const RemeshCamera& camera, const RemeshOpti
         for (const Kind& kind : kinds_) sum += kind.looked;
         return sum;
     };
+    const auto cellsWanted = [&] {
+        double sum = 0;
+        for (size_t i = 0; i < seen_.size(); ++i) {
+            const glm::dvec2 a = grids_[i][1] - grids_[i][0], b = grids_[i][2] - grids_[i][0];
+            if (seen_[i].is) sum += 0.5 * std::abs(a.x * b.y - a.y * b.x) * std::exp2(-2 * wanted_[i]);
+        }
+        return sum;
+    };
     const uint64_t before = lookedAt();
-    if (!options.shareOut)
-        wantSteps(0, kinds_.size());
-    else if (!options.shareOut(kinds_.size(), wantSteps))
-        return Error::cancelled();
+    for (;; view.narrowest *= 2) {
+        if (!options.shareOut)
+            wantSteps(0, kinds_.size());
+        else if (!options.shareOut(kinds_.size(), wantSteps))
+            return Error::cancelled();
+        if (view.narrowest >= kLeastNarrowPixels || cellsWanted() <= kMostCells) break;
+    }
     std::ranges::fill(edgeSteps_, coarsest_);
     std::vector<uint32_t> open;
     Scratch scratch;
@@ -373,13 +509,12 @@ Result<void> CertifiedCells::choose(const RemeshCamera& camera, const RemeshOpti
     while (!open.empty()) {
         const uint32_t patch = open.back();
         open.pop_back();
-        if (!keeps(patch, seen_[patch], cells(patch), options.errorPixels, scratch)) refine(patch, open);
+        if (!keeps(view, patch, seen_[patch], cells(patch), options.errorPixels, scratch)) refine(patch, open);
     }
     for (uint32_t i = 0; i < seen_.size(); ++i) {
         if (!seen_[i].is) continue;
-        const Known& of = known(i, seen_[i], cells(i), options.errorPixels, scratch);
-        const double error = pixels(seen_[i], double(of.height) + double(of.jump), double(of.across));
-        if (of.isWhole && error <= options.errorPixels)
+        const double error = errorOf(view, i, seen_[i], cells(i), options.errorPixels, scratch);
+        if (error <= options.errorPixels)
             counts.boundPixels = std::max(counts.boundPixels, error);
         else
             ++counts.uncertified;

@@ -14,17 +14,30 @@
 // patch, over all depths that it may have. So every point of the picture of the mesh is within so many pixels of the
 // displaced surface's at the same place of the base, and the other way round.
 //
+// Where the map is steep, that asks for more than can be seen: the surface is near in the picture, but of another
+// place. A triangle's corners lie on the surface, and between them the map has all heights from the lowest of theirs to
+// the highest, as the triangle has: each point of one is as high as some point of the other over the same triangle of
+// the base. So they are no farther apart than that is wide, along its edges in the picture, and by how much the map
+// goes beyond the corners' heights. The less of the two certificates counts.
+//
+// Patches are smaller where the map is steep (height_bends.h), down to parts of a texel: their edges end where they
+// cross the lines between texels, so that within a patch nothing bends sharply.
+//
+// Where the map jumps along an edge, the surface has a wall there between the heights of both sides; the mesh goes down
+// from the higher ones within its first cells, which the second certificate covers.
+//
 // Where the map repeats, patches repeat: those with the same texels and directions are measured once (`kinds_`).
 //
-// What is not certified: the rounding of single precision; what is nearer to the eye than the patch's own size; what
-// would take cells narrower than half a pixel; and where the map jumps along an edge, the slope from the higher side's
-// heights down to the lower side, within cells beside the edge that are at most options.cell pixels wide.
-// RemeshCounts::uncertified counts the patches of the last three. One thread at a time calls.
+// What is not certified: the rounding of single precision; what is nearer to the eye than the patch's own size; and
+// where the map jumps along an edge and cells of a sixteenth of a texel are wider than what is allowed: there slopes
+// stand for the wall, within cells beside the edge that are at most options.cell pixels wide.
+// RemeshCounts::uncertified counts the patches of the last two. One thread at a time calls.
 #pragma once
 
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include <glm/vec2.hpp>
@@ -65,21 +78,33 @@ private:
         float height = 0;     ///< most that heights differ, in parts of the range, were it not for jumps
         float jump = 0;       ///< most by which a corner of a triangle is higher than the patch's own map
         float across = 0;     ///< most of the covariance, world units
-        bool isWhole = true;  ///< false: it is more than that
+        bool isWhole = true;  ///< false: heights differ by more than that
+        /// Most that an edge of a triangle is long along x, y, x + y and x - y; texels.
+        std::array<float, 4> reach{};
+        float beyond = 0;            ///< most that heights are beyond those of a triangle's corners
+        bool isBeyondWhole = false;  ///< false: they may be beyond by more than that
+    };
+    /// What the edges of a patch's triangles are in a view.
+    struct Reach {
+        double pixels = 0;  ///< at depth 1
+        double length = 0;  ///< world units
     };
     /// Patches with the same texels and directions: one is measured for all.
     struct Kind {
         std::vector<uint32_t> patches;
         std::vector<Known> known;
-        uint64_t looked = 0;  ///< texels, ever
+        uint64_t looked = 0;             ///< texels, ever
+        double lowest = 1, highest = 0;  ///< heights are between these; where lowest is above, not known yet
+        bool mayJump = false;            ///< along its edges
     };
     /// What a view makes of errors: pixels are (perHeight height + perUnit across) / (depth - nearer |error|).
     struct Seen {
         bool is = false;
-        bool canKeep = false;           ///< what is allowed, with even cells
-        int widest = 0, narrowest = 0;  ///< steps of the cells that it may have
-        int pixel = 0;                  ///< step of cells of options.cell pixels
+        bool canKeep = false;            ///< what is allowed, with even cells
+        int pixel = 0;                   ///< step of cells of options.cell pixels
+        double lowest = 0, highest = 1;  ///< heights are between these
         double perHeight = 0, perUnit = 0, depth = 1, nearer = 0;
+        glm::dvec4 tangents{0};  ///< of what is seen: left, lower, right, upper
     };
     struct View;
     struct Scratch;
@@ -87,16 +112,26 @@ private:
     void addEdges();
     void addKinds();
     void measureCorners();
-    [[nodiscard]] Seen seenIn(const View& view, size_t patch) const;
-    [[nodiscard]] double pixels(const Seen& seen, double height, double across) const;
+    [[nodiscard]] std::pair<double, double> rangeOf(size_t patch);
+    [[nodiscard]] Seen seenIn(const View& view, size_t patch);
+    [[nodiscard]] double pixels(const Seen& seen, double height, double across, const Reach& reach) const;
     [[nodiscard]] PatchCells evenly(size_t patch, int step) const;
-    void limitSteps(const View& view, size_t patch, Seen& seen) const;
+    void choosePixelStep(const View& view, size_t patch, Seen& seen) const;
     /// Returns the coarsest step that keeps what is allowed, and sets whether one does; else that of a pixel.
-    int wantedStep(size_t patch, Seen& seen, double allowed, Scratch& scratch);
-    /// Returns what is known of a patch's error, exactly where it is at most `allowed` pixels.
+    int wantedStep(const View& view, size_t patch, Seen& seen, double allowed, Scratch& scratch);
+    /// Returns what is known of how heights differ, exactly where that is at most `allowed` pixels.
     Known& known(size_t patch, const Seen& seen, const PatchCells& cells, double allowed, Scratch& scratch);
+    void sweepOver(size_t patch, const PatchCells& cells, Scratch& scratch) const;
     void measure(Kind& kind, Known& known, double enough, Scratch& scratch) const;
-    bool keeps(size_t patch, const Seen& seen, const PatchCells& cells, double allowed, Scratch& scratch);
+    void measureBeyond(Kind& kind, Known& known, double enough, Scratch& scratch) const;
+    [[nodiscard]] Reach reachOf(const View& view, size_t patch, const Seen& seen, const Known& known) const;
+    /// Returns the pixels that are certified of a patch with some cells; infinity, where it may be off by more than is
+    /// allowed.
+    double errorOf(const View& view, size_t patch, const Seen& seen, const PatchCells& cells, double allowed,
+                   Scratch& scratch);
+    /// Whether what is allowed is kept, but for a jump that no cells take away.
+    bool keeps(const View& view, size_t patch, const Seen& seen, const PatchCells& cells, double allowed,
+               Scratch& scratch);
     void refine(size_t patch, std::vector<uint32_t>& open);
 
     RemeshSurface patches_;

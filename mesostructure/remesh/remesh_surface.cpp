@@ -10,6 +10,7 @@
 #include <glm/geometric.hpp>
 
 #include "mesostructure/base/surface_edges.h"
+#include "mesostructure/remesh/height_bends.h"
 #include "mesostructure/shell.h"
 
 namespace vcp::meso {
@@ -17,6 +18,10 @@ namespace vcp::meso {
 namespace {
 
 using glm::dvec2, glm::dvec3, glm::vec2;
+
+// Where a slope changes by more than this in a texel, or the map jumps along an edge by more than that part of a texel,
+// patches are small.
+constexpr double kSteepBend = 4, kSteepJump = 1.0 / 16;
 
 Error invalid(std::string message) { return {.code = ErrorCode::InvalidInput, .message = std::move(message)}; }
 
@@ -101,11 +106,11 @@ void addPlaces(RemeshSurface& surface) {
     for (size_t i = 1; i < surface.firstPlace.size(); ++i) surface.firstPlace[i] += surface.firstPlace[i - 1];
 }
 
-/// Halves triangles until none of their edges is longer than so many texels.
+/// Halves the edges of triangles until none is too long.
 class Cutting {
 public:
-    Cutting(const RemeshSurface& from, double mostTexels, uint64_t mostTriangles)
-        : most_(mostTexels), mostTriangles_(mostTriangles), texels_(from.heights->texels()), cut_(from) {
+    Cutting(const RemeshSurface& from, const CutOptions& options)
+        : options_(options), texels_(from.heights->texels()), cut_(from) {
         cut_.triangles.clear(), cut_.uvs.clear(), cut_.baseTriangles.clear(), cut_.seams.clear(), cut_.seamUvs.clear(),
             cut_.places.clear();
     }
@@ -134,55 +139,168 @@ private:
         uint32_t baseTriangle = 0;
     };
 
-    [[nodiscard]] double lengthOf(vec2 a, vec2 b) const { return glm::length((dvec2(b) - dvec2(a)) * texels_); }
+    /// Returns the length of an edge in texels, the longer of its two sides', where it is halved; else 0. It depends on
+    /// the edge alone.
+    [[nodiscard]] double tooLong(const Part& part, size_t k) const {
+        const vec2 a = part.uvs[k], b = part.uvs[(k + 1) % 3];
+        const auto lengthOf = [&](vec2 from, vec2 to) { return glm::length((dvec2(to) - dvec2(from)) * texels_); };
+        const double own = lengthOf(a, b), beyond = lengthOf(part.beyond[k][0], part.beyond[k][1]),
+                     length = std::max(own, beyond);
+        if (length > options_.mostTexels) return length;
+        if (options_.bends == nullptr) return 0;
+        if (!(length > options_.mostSteepTexels) && crossingOf(part, k) == 0) return 0;
+        const uint32_t from = part.corners[k], to = part.corners[(k + 1) % 3];
+        const double high =
+                         std::max(glm::length(dvec3(cut_.directions[from])), glm::length(dvec3(cut_.directions[to]))),
+                     wide = glm::distance(dvec3(cut_.positions[from]), dvec3(cut_.positions[to]));
+        // How much a slope changes in a texel is compared with 1: both in units of the world.
+        const bool isSteep =
+            high * options_.bends->along(a, b) * own > kSteepBend * wide ||
+            high * options_.bends->along(part.beyond[k][0], part.beyond[k][1]) * beyond > kSteepBend * wide ||
+            high * jumpAlong(part, k) * length > kSteepJump * wide;
+        return isSteep ? length : 0;
+    }
+
+    /// Returns by how much the heights on an edge's two sides differ, in some places.
+    [[nodiscard]] double jumpAlong(const Part& part, size_t k) const {
+        const vec2 a = part.uvs[k], b = part.uvs[(k + 1) % 3];
+        const auto& [start, end] = part.beyond[k];
+        if (a == start && b == end) return 0;
+        double most = 0;
+        constexpr int kPlaces = 16;
+        for (int i = 0; i <= kPlaces; ++i) {
+            const double t = double(i) / kPlaces;
+            most = std::max(most, std::abs(cut_.heights->height(0, glm::mix(dvec2(a), dvec2(b), t)) -
+                                           cut_.heights->height(0, glm::mix(dvec2(start), dvec2(end), t))));
+        }
+        return most;
+    }
 
     Result<void> step() {
         const Part part = open_.back();
         open_.pop_back();
-        int longest = -1;
-        double most = most_;
-        for (int k = 0; k < 3; ++k)
-            if (const double length = std::max(lengthOf(part.uvs[k], part.uvs[(k + 1) % 3]),
-                                               lengthOf(part.beyond[k][0], part.beyond[k][1]));
-                length > most)
-                longest = k, most = length;
-        if (longest < 0) {
+        std::array<double, 3> lengths;
+        for (size_t k = 0; k < 3; ++k) lengths[k] = tooLong(part, k);
+        const size_t longest = size_t(std::ranges::max_element(lengths) - lengths.begin());
+        if (lengths[longest] == 0) {
             cut_.triangles.push_back(part.corners), cut_.uvs.push_back(part.uvs);
             cut_.baseTriangles.push_back(part.baseTriangle);
         } else {
-            halve(part, longest);
+            halve(part, longest, lengths);
         }
-        if (cut_.triangles.size() + open_.size() > mostTriangles_)
+        if (cut_.triangles.size() + open_.size() > options_.mostTriangles)
             return Error{.code = ErrorCode::Limit,
                          .message = fmt::format("a remeshed surface of more than {} patches of {} texels",
-                                                mostTriangles_, most_)};
+                                                options_.mostTriangles, options_.mostTexels)};
         return {};
     }
 
-    void halve(const Part& part, int k) {
-        const int next = (k + 1) % 3, other = (k + 2) % 3;
-        const uint32_t middle = middleOf(part.corners[k], part.corners[next]);
-        const vec2 uv = 0.5f * (part.uvs[k] + part.uvs[next]), beyond = 0.5f * (part.beyond[k][0] + part.beyond[k][1]);
-        Part first = part, second = part;
-        first.corners[next] = second.corners[k] = middle;
-        first.uvs[next] = second.uvs[k] = uv;
-        first.beyond[k][1] = second.beyond[k][0] = beyond;
-        first.beyond[next] = {uv, part.uvs[other]}, second.beyond[other] = {part.uvs[other], uv};
-        open_.push_back(second), open_.push_back(first);
-    }
-
-    uint32_t middleOf(uint32_t a, uint32_t b) {
-        const auto [found, isNew] =
-            middles_.try_emplace((uint64_t{std::min(a, b)} << 32) | std::max(a, b), uint32_t(cut_.positions.size()));
-        if (isNew) {
-            cut_.positions.push_back(0.5f * (cut_.positions[a] + cut_.positions[b]));
-            cut_.directions.push_back(0.5f * (cut_.directions[a] + cut_.directions[b]));
+    /// Halves the longest edge, and with it one that is nearly as long: the two middles are joined, so that what is
+    /// narrow gets shorter, not narrower.
+    void halve(const Part& part, size_t k, const std::array<double, 3>& lengths) {
+        constexpr double kNearly = 0.75;
+        const size_t next = (k + 1) % 3, other = (k + 2) % 3;
+        const auto [first, second] = halved(part, k);
+        const bool isNext = lengths[next] >= lengths[other];
+        if (std::max(lengths[next], lengths[other]) < kNearly * lengths[k]) {
+            open_.push_back(second), open_.push_back(first);
+            return;
         }
-        return found->second;
+        // The half that has the other long edge is halved there, and its edge from that middle is the one to the first.
+        const Part& rest = isNext ? second : first;
+        const auto [upper, lower] = halved(rest, isNext ? next : other);
+        open_.push_back(isNext ? first : second), open_.push_back(upper), open_.push_back(lower);
     }
 
-    double most_;
-    uint64_t mostTriangles_;
+    /// Returns the halves of a triangle on both sides of the line from the middle of edge k to the opposite corner: the
+    /// one with the edge's start first.
+    std::pair<Part, Part> halved(const Part& part, size_t k) {
+        const size_t next = (k + 1) % 3, other = (k + 2) % 3;
+        const Middle middle = middleOf(part, k);
+        Part first = part, second = part;
+        first.corners[next] = second.corners[k] = middle.corner;
+        first.uvs[next] = second.uvs[k] = middle.uv;
+        first.beyond[k][1] = second.beyond[k][0] = middle.beyond;
+        first.beyond[next] = {middle.uv, part.uvs[other]}, second.beyond[other] = {part.uvs[other], middle.uv};
+        return {first, second};
+    }
+
+    /// An edge and its other side, from the end with the lower number; in texels.
+    struct Line {
+        dvec2 start, end, beyondStart, beyondEnd;
+        bool hasSeam;
+    };
+
+    [[nodiscard]] Line lineOf(const Part& part, size_t k) const {
+        const size_t next = (k + 1) % 3;
+        const auto& [start, end] = part.beyond[k];
+        Line line{dvec2(part.uvs[k]) * texels_, dvec2(part.uvs[next]) * texels_, dvec2(start) * texels_,
+                  dvec2(end) * texels_, part.uvs[k] != start || part.uvs[next] != end};
+        if (part.corners[k] > part.corners[next])
+            std::swap(line.start, line.end), std::swap(line.beyondStart, line.beyondEnd);
+        return line;
+    }
+
+    /// Returns where an edge crosses a line between the map's texels, on either side, nearest to its middle; as a part
+    /// of its length from the end with the lower number; 0: nowhere between its ends.
+    [[nodiscard]] float crossingOf(const Part& part, size_t k) const {
+        constexpr double kOnLine = 1e-3;  // texels
+        const Line line = lineOf(part, k);
+        double best = 0;
+        const auto look = [&](double a, double b) {
+            const double middle = 0.5 * (a + b);
+            for (const double at : {std::floor(middle), std::ceil(middle)}) {
+                const double t = (at - a) / (b - a);
+                if (at > std::min(a, b) + kOnLine && at < std::max(a, b) - kOnLine &&
+                    std::abs(t - 0.5) < std::abs(best - 0.5))
+                    best = t;
+            }
+        };
+        for (int axis = 0; axis < 2; ++axis) look(line.start[axis], line.end[axis]);
+        for (int axis = 0; axis < 2 && line.hasSeam; ++axis) look(line.beyondStart[axis], line.beyondEnd[axis]);
+        return float(best);
+    }
+
+    /// Returns where an edge is halved, from the end with the lower number: where it crosses a line of the map near its
+    /// middle, so that triangles have their corners on texels; of a long seam in the middle.
+    [[nodiscard]] float partOf(const Part& part, size_t k) const {
+        const Line line = lineOf(part, k);
+        const dvec2 along = line.end - line.start;
+        if (std::max(glm::length(along), glm::length(line.beyondEnd - line.beyondStart)) <= options_.mostSteepTexels)
+            if (const float t = crossingOf(part, k); t > 0) return t;
+        if (line.hasSeam) return 0.5f;
+        const int axis = std::abs(along.x) >= std::abs(along.y) ? 0 : 1;
+        const double middle = 0.5 * (line.start[axis] + line.end[axis]), most = 0.125 * std::abs(along[axis]);
+        for (double step = std::exp2(std::floor(std::log2(std::max(options_.mostTexels, 1.0)))); step >= 1; step /= 2)
+            if (const double at = std::floor(middle / step + 0.5) * step; std::abs(at - middle) <= most)
+                return float((at - line.start[axis]) / along[axis]);
+        return 0.5f;
+    }
+
+    struct Middle {
+        uint32_t corner;
+        vec2 uv, beyond;
+    };
+
+    /// Returns the point at which an edge is halved, the same from both its sides.
+    Middle middleOf(const Part& part, size_t k) {
+        const size_t next = (k + 1) % 3;
+        const auto& [start, end] = part.beyond[k];
+        const bool isTurned = part.corners[k] > part.corners[next];
+        const size_t first = isTurned ? next : k, second = isTurned ? k : next;
+        const float t = partOf(part, k);
+        const auto between = [t](const auto& a, const auto& b) { return a + t * (b - a); };
+        const uint32_t a = part.corners[first], b = part.corners[second];
+        const auto [found, isNew] = middles_.try_emplace((uint64_t{a} << 32) | b, uint32_t(cut_.positions.size()));
+        if (isNew) {
+            cut_.positions.push_back(between(cut_.positions[a], cut_.positions[b]));
+            cut_.directions.push_back(between(cut_.directions[a], cut_.directions[b]));
+        }
+        return {found->second, between(part.uvs[first], part.uvs[second]),
+                isTurned ? between(end, start) : between(start, end)};
+    }
+
+    const CutOptions& options_;
     dvec2 texels_;
     RemeshSurface cut_;
     std::vector<Part> open_;
@@ -191,8 +309,8 @@ private:
 
 }  // namespace
 
-Result<RemeshSurface> cutSurface(const RemeshSurface& surface, double mostTexels, uint64_t mostTriangles) {
-    return Cutting(surface, mostTexels, mostTriangles).run(surface);
+Result<RemeshSurface> cutSurface(const RemeshSurface& surface, const CutOptions& options) {
+    return Cutting(surface, options).run(surface);
 }
 
 Result<RemeshSurface> buildRemeshSurface(const BaseSurface& base, std::shared_ptr<const HeightLevels> heights,

@@ -45,8 +45,17 @@ struct RemeshSurface {
 Result<RemeshSurface> buildRemeshSurface(const BaseSurface& base, std::shared_ptr<const HeightLevels> heights,
                                          double height, double offset = 0);
 
-/// Returns the same surface in triangles with edges of at most so many texels of the map: longer ones are halved, along
-/// both sides of an edge alike. Errors: Limit (more than `mostTriangles`).
-Result<RemeshSurface> cutSurface(const RemeshSurface& surface, double mostTexels, uint64_t mostTriangles);
+class HeightBends;
+
+struct CutOptions {
+    double mostTexels = 16;              ///< of an edge
+    const HeightBends* bends = nullptr;  ///< of the map; null: it is steep nowhere
+    double mostSteepTexels = 4;          ///< of an edge where the map is steep, or jumps along it
+    uint64_t mostTriangles = uint64_t{1} << 22;
+};
+
+/// Returns the same surface in triangles with shorter edges: longer ones are halved, along both sides of an edge alike.
+/// Errors: Limit (more than `mostTriangles`).
+Result<RemeshSurface> cutSurface(const RemeshSurface& surface, const CutOptions& options);
 
 }  // namespace vcp::meso

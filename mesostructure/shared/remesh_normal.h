@@ -13,6 +13,26 @@ struct RemeshFrame {
     Real turned;             // sign of a product of derivatives that points outwards; 0 where the map has no area
 };
 
+// Whether a place in tile units is one of the base triangle.
+INLINE bool remeshIsWithin(CONST_REF(RemeshFrame) frame, Real2 at) {
+    Real2 off = at - frame.at, b = frame.toSecond, c = frame.toLast;
+    Real area = b.x * c.y - b.y * c.x, second = (off.x * c.y - off.y * c.x) / area,
+         last = (b.x * off.y - b.y * off.x) / area;
+    return second >= Real(0) && last >= Real(0) && second + last <= Real(1);
+}
+
+// Returns the heights' derivative along an axis of the map, from what lies `reach` ahead and behind. Where the base
+// triangle goes on the other way, it does not look over an edge: there the heights may bend as sharply as the base
+// does.
+INLINE Real remeshSlope(CONST_REF(RemeshFrame) frame, CONST_REF(RemeshFootprint) footprint, Real2 at, Real2 reach) {
+    Real2 far = Real(4) * reach;
+    bool looksAhead = remeshIsWithin(frame, at + reach) || !remeshIsWithin(frame, at - far);
+    bool looksBehind = remeshIsWithin(frame, at - reach) || !remeshIsWithin(frame, at + far);
+    Real ahead = looksAhead ? Real(1) : Real(0), behind = looksBehind ? Real(1) : Real(0);
+    Real rise = remeshHeight(footprint, at + ahead * reach) - remeshHeight(footprint, at - behind * reach);
+    return rise / ((ahead + behind) * (reach.x + reach.y));
+}
+
 // Returns the unit normal at a place in tile units. `texels`: the edge of the footprint, in texels.
 INLINE Real3 remeshNormal(CONST_REF(RemeshFrame) frame, Real texels, Real2 at) {
     if (frame.turned == Real(0)) return frame.facet;
@@ -20,13 +40,13 @@ INLINE Real3 remeshNormal(CONST_REF(RemeshFrame) frame, Real texels, Real2 at) {
     Real step = (remeshLevels() == 1 ? Real(1) : max(texels, Real(1))) / Real(remeshLevel(0).size.x);
     RemeshFootprint footprint = remeshFootprint(texels);
     Real reach = Real(0.5) * step;
-    Real alongU = remeshHeight(footprint, at + Real2(reach, 0)) - remeshHeight(footprint, at - Real2(reach, 0));
-    Real alongV = remeshHeight(footprint, at + Real2(0, reach)) - remeshHeight(footprint, at - Real2(0, reach));
+    Real alongU = remeshSlope(frame, footprint, at, Real2(reach, 0));
+    Real alongV = remeshSlope(frame, footprint, at, Real2(0, reach));
     Real height = remeshHeight(footprint, at);
     Real2 off = at - frame.at;
     Real3 direction = frame.direction + off.x * frame.directionByU + off.y * frame.directionByV;
-    Real3 u = frame.byU + alongU / step * direction + height * frame.directionByU;
-    Real3 v = frame.byV + alongV / step * direction + height * frame.directionByV;
+    Real3 u = frame.byU + alongU * direction + height * frame.directionByU;
+    Real3 v = frame.byV + alongV * direction + height * frame.directionByV;
     Real3 normal = cross(u, v);
     Real square = dot(normal, normal);
     return square > Real(0) ? normal * (frame.turned / sqrt(square)) : frame.facet;

@@ -7,6 +7,7 @@
 #include "mesostructure/method.h"
 #include "mesostructure/solids.h"
 #include "render/meso_surface.h"
+#include "tests/support/meso_surfaces.h"
 #include "tests/support/renderer_fixture.h"
 
 namespace vcp {
@@ -266,6 +267,43 @@ TEST_F(RemeshedSurfaces, ShadeWhatIsBelowThem) {
         EXPECT_GT(marched.count(), 300u);
         EXPECT_LT(marched.differing(remeshed) + remeshed.differing(marched), marched.count() / 50);
         EXPECT_LT(before.differing(remeshed), marched.count() / 50);
+    }
+}
+
+/// A cube from 4 to 12, from above: over it, within it and beside it lies a remeshed plateau of 2 x 2 units.
+TEST_F(RemeshedSurfaces, NearerOfDatasetAndSurfaceIsSeenAndShadesTheOther) {
+    const auto plateauAt = [](glm::dvec3 place) {
+        MesoSurface made = vcp::test::mesoSurface(vcp::test::plateau(), "pyramid", "quad", 1, 2, place);
+        made.remeshed = surfaceOf(plateau(), "quad", 1, 1, place).remeshed;
+        made.remeshed.options.errorPixels = 0.5;
+        return made;
+    };
+    const vcp::test::Scene cube = vcp::test::cubeScene(0);
+    const auto pixelOf = [](double x) { return size_t(kEdge / 2) * kEdge + size_t(x / 16 * kEdge); };
+    for (const uint32_t occlusionRays : {0u, 1u}) {
+        SCOPED_TRACE(occlusionRays);
+        start();
+        show(cube);
+        FrameRequest request;
+        request.width = request.height = kEdge;
+        request.camera = {.eye = {8, 8, 20},
+                          .forward = {0, 0, -1},
+                          .up = {0, 1, 0},
+                          .projection = Projection::Orthographic,
+                          .orthographicHeight = 16};
+        request.shading.lightFollowsCamera = false;
+        request.shading.lightDirection = glm::normalize(glm::vec3(0.5f, 0, 1));
+        request.shading.occlusionRays = occlusionRays;
+        const Shadows found =
+            shadowsOf({plateauAt({6, 8, 13}), plateauAt({10, 8, 10}), plateauAt({2.5, 8, 8})}, request);
+        const auto depths = *renderer_->readDepth();
+        EXPECT_NEAR(depths[pixelOf(6)], 20 - 13.6, 1e-3);
+        EXPECT_NEAR(depths[pixelOf(10)], 20 - 12, 1e-3);
+        EXPECT_NEAR(depths[pixelOf(3)], 20 - 8.6, 1e-3);
+        // The upper plateau ends at x = 5, and its shadow on the cube at 4.2; that of the cube on the lower one at 2.3.
+        EXPECT_TRUE(found.dark[pixelOf(4.7)]);
+        EXPECT_TRUE(found.dark[pixelOf(3)]);
+        for (const double x : {1.8, 4.05, 6.0, 10.0}) EXPECT_FALSE(found.dark[pixelOf(x)]) << x;
     }
 }
 

@@ -164,9 +164,12 @@ FrameRequest requestFor(const RenderCommand& command, const OpenedScene& open, c
 
 /// Draws all inputs together, into one picture or a sequence. Returns its figures, for --json.
 Result<Json> render(const RenderCommand& command) {
-    VCP_TRY_ASSIGN(auto open,
-                   openSceneShown(command.inputs, command.build, command.render.source, command.report.progressStyle(),
-                                  {command.methods.empty() ? "" : command.methods[0], command.subdivide}));
+    const SurfaceChoices choices{
+        .method = command.methods.empty() ? "" : command.methods[0],
+        .subdivide = command.subdivide,
+        .withLightRays = command.render.shading.shadows || command.render.shading.occlusionRays > 0};
+    VCP_TRY_ASSIGN(auto open, openSceneShown(command.inputs, command.build, command.render.source,
+                                             command.report.progressStyle(), choices));
     if ((!command.methods.empty() || command.subdivide) && open.file.surfaces.empty())
         return Error{.code = ErrorCode::Usage,
                      .message = fmt::format("{} goes with a scene that has mesostructure",

@@ -103,7 +103,7 @@ public:
         const LevelFit fit = d.errorPixels > 0 || isLarge ? LevelFit::Averaged : LevelFit::Least;
         auto& [levels, arrays] = levels_[{d.asset, d.withFilter, fit}];
         if (!levels) {
-            arrays = castingArrays(*asset.heights);
+            if (d.withLightRays) arrays = castingArrays(*asset.heights);
             LevelFitOptions options{.fit = fit};
             if (!d.withFilter) options.mostLevels = 1;
             VCP_TRY_ASSIGN(auto made, HeightLevels::build(std::move(*asset.heights), options));
@@ -124,6 +124,7 @@ public:
                                  return shareOut(count, fill, {});
                              }}};
         surface.withBase = d.withBase;
+        if (!d.withLightRays) return surface;
         auto shell =
             arrays
                 ? buildShell(base, height, asset.extent, d.offset * d.scale)

@@ -68,11 +68,12 @@ struct MesoSurfaceDescription {
     double heightScale = 1;      ///< height of the slab; 1: in the asset's own proportion to its tile's edge
     double offset = 0;       ///< by how much the slab's bottom lies over the base, in the base's units; below 0 under
     bool withFilter = true;  ///< kRemeshMethod: with coarser levels of the heights
-    glm::dvec3 place{0};     ///< the base's origin, world
-    SurfacePath path;        ///< of the origin, world; not of kRemeshMethod
-    double scale = 1;        ///< scale of the base, of mesh files too
-    UpAxis up = UpAxis::Z;   ///< which way the base's z points; mesh files stay as they are
-    glm::vec3 colour{0.8f};  ///< encoded
+    bool withLightRays = true;  ///< kRemeshMethod: it may cast shadows and occlude, for which more is made
+    glm::dvec3 place{0};        ///< the base's origin, world
+    SurfacePath path;           ///< of the origin, world; not of kRemeshMethod
+    double scale = 1;           ///< scale of the base, of mesh files too
+    UpAxis up = UpAxis::Z;      ///< which way the base's z points; mesh files stay as they are
+    glm::vec3 colour{0.8f};     ///< encoded
     std::string colourTexture, normalTexture;  ///< pictures over the tile (viewer/scene/tile_texture.h); empty: none
     bool withBase = true;
     bool withFar = true;        ///< far away it is not marched (MesoLook::errorPixels)

@@ -127,6 +127,7 @@ void SurfaceChoices::applyTo(SceneFile& scene) const {
     for (MesoSurfaceDescription& surface : scene.surfaces) {
         if (!method.empty()) surface.method.name = method;
         if (subdivide) surface.subdivide = *subdivide;
+        if (!withLightRays) surface.withLightRays = false;
     }
 }
 

@@ -88,6 +88,7 @@ Result<OpenedScene> openScene(SceneFile file, const std::string& name,
 struct SurfaceChoices {
     std::string method;            ///< empty: the scene's
     std::optional<int> subdivide;  ///< times that Loop's rules are applied; none: the scene's
+    bool withLightRays = true;     ///< false: no shadows and no occlusion will be asked for
 
     void applyTo(SceneFile& scene) const;
 };

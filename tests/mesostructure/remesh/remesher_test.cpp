@@ -280,6 +280,30 @@ TEST(Remesher, NormalsAreThoseOfTheDisplacedSurface) {
         }
 }
 
+/// Heights that bend along an edge of the base, as baked ones do where it bends the other way: up to the edge, normals
+/// are those of its own side.
+TEST(Remesher, NormalsDoNotLookOverEdgesOfTheBase) {
+    const BaseSurface base{{{-1, 0, 0}, {0, 0, 0}, {1, 0, 0}, {-1, 1, 0}, {0, 1, 0}, {1, 1, 0}},
+                           {{0, 1, 4}, {0, 4, 3}, {1, 2, 5}, {1, 5, 4}},
+                           {{dvec2(0.25, 0.25), dvec2(0.5, 0.25), dvec2(0.5, 0.5)},
+                            {dvec2(0.25, 0.25), dvec2(0.5, 0.5), dvec2(0.25, 0.5)},
+                            {dvec2(0.5, 0.25), dvec2(0.75, 0.25), dvec2(0.75, 0.5)},
+                            {dvec2(0.5, 0.25), dvec2(0.75, 0.5), dvec2(0.5, 0.5)}}};
+    HeightMap valley{{64, 64}, 1, std::vector<uint16_t>(64 * 64)};
+    for (int i = 0; i < 64 * 64; ++i) valley.texels[size_t(i)] = uint16_t(2000 * std::abs(i % 64 - 32));
+    auto levels = std::make_shared<HeightLevels>(*HeightLevels::build(valley, {.fit = LevelFit::Averaged}));
+    const RemeshSurface surface = *buildRemeshSurface(base, levels, 0.5);
+    RemeshHeights<double> heights{{levels.get()}};
+    for (const auto& [triangle, side] : {std::pair<size_t, double>{0, -1}, {3, 1}}) {
+        const RemeshFrame frame = remeshFrame(surface, triangle);
+        const dvec3 far = heights.remeshNormal(frame, 1, dvec2(0.5 + side * 0.05, 0.4 + side * 0.05));
+        EXPECT_GT(-side * far.x, 0.1);
+        for (const double texels : {0.01, 0.2, 0.4, 0.7})
+            EXPECT_GT(glm::dot(heights.remeshNormal(frame, 1, dvec2(0.5 + side * texels / 64, 0.4)), far), 1 - 1e-9)
+                << side << ", " << texels;
+    }
+}
+
 /// Against the pieces of the shell themselves, which say where a place of the map is.
 TEST(Remesher, PointsOfTheShellAreWhereRaysMeetTheMap) {
     for (const auto base : {"sphere", "box", "cylinder", "torus"}) {

@@ -218,8 +218,8 @@ TEST(Bake, BumpsOverTwoTrianglesToTheStep) {
     const double step = maps.heights.range / 65535;
     for (int y = 0; y < 64; ++y)
         for (int x = 0; x < 64; ++x) {
-            // Texels are where other programs have them.
-            const dvec3 above((x + 0.5) / 64, (y + 0.5) / 64, 1);
+            // The outermost texels lie on the border.
+            const dvec3 above(x / 63.0, y / 63.0, 1);
             const auto hit = scan.bvh().nearestHit(above, {0, 0, -1});
             ASSERT_TRUE(hit);
             ASSERT_NEAR(valueOf(maps.heights, size_t(x) + 64 * size_t(y)), 1 - hit->t, 0.5 * step + 1e-7)

@@ -275,6 +275,13 @@ TEST(SceneFile, SurfacesMayBeRemeshed) {
     EXPECT_TRUE(made->surfaces[0].arrays) << "it casts shadows";
     EXPECT_GT(made->surfaces[0].lift, 0);
     EXPECT_TRUE(made->warnings.empty());
+    SceneFile unshaded = *scene;
+    SurfaceChoices{.method = {}, .subdivide = {}, .withLightRays = false}.applyTo(unshaded);
+    const auto lean = makeMesoScene(unshaded.surfaces);
+    ASSERT_TRUE(lean) << lean.error().line();
+    EXPECT_TRUE(lean->surfaces[0].remeshed.surface);
+    EXPECT_FALSE(lean->surfaces[0].arrays) << "nobody asks for shadows";
+    EXPECT_TRUE(lean->warnings.empty());
     EXPECT_EQ(made->surfaces[0].remeshed.options.cell, 5);
     EXPECT_EQ(made->surfaces[0].remeshed.options.errorPixels, 0.5);
     for (const double error : {0.0, 0.05, 4.0}) {
