@@ -262,12 +262,14 @@ INLINE Real3 intersectNeedle(Real3 d, Real3 va, Real3 vb, Real3 vc, Real slack) 
     bool isA = la >= longest, isB = !isA && lb >= longest;
     Real3 from = isA ? vb : isB ? vc : va, edge = isA ? bc : isB ? ca : ab;
     Real s = dot(nearestOn(from, edge), n) / dot(n, d);
-    // Widened edges meet far beyond the tip.
-    Real along = dot(d * s - from, edge) / longest, reach = slack / sqrt(longest);
-    Real3 weights = isA   ? Real3(s, Real(1.0) - along, along)
-                    : isB ? Real3(s, Real(0.0), Real(1.0) - along)
-                          : Real3(s, along, Real(0.0));
-    return along >= -reach && along <= Real(1.0) + reach ? weights : Real3(Real(1e30), Real(0.0), Real(0.0));
+    Real3 x = d * s, off = nearestOn(from - x, edge);
+    // Widened edges meet far beyond the tip, and a plane that is nothing but rounding far from the edge.
+    Real along = dot(x - from, edge) / longest, reach = slack / sqrt(longest), wide = sqrt(dot(n, n) / longest) + slack;
+    bool near = along >= -reach && along <= Real(1.0) + reach && dot(off, off) <= wide * wide;
+    if (!near) return Real3(Real(1e30), Real(0.0), Real(0.0));
+    return isA   ? Real3(s, Real(1.0) - along, along)
+           : isB ? Real3(s, Real(0.0), Real(1.0) - along)
+                 : Real3(s, along, Real(0.0));
 }
 
 // Finds where the line q + s d (|d| about 1) meets triangle a b c, in page space: x = s, y and z the weights of
