@@ -38,7 +38,7 @@ TEST(MotionBench, SlowFramesAreSmaller) {
     const auto dataset = std::make_shared<const Dataset>(readDataset(*reader).value());
     MotionOptions options;
     options.size = {64, 48};
-    options.seconds = 0.3;
+    options.seconds = 1.5;
     options.viewer.movingFrameMs = 1e-6;
     options.viewer.renderer.budgetBytes = 16 << 20;
     const PlacedDataset placed{dataset, std::make_shared<FilePageSource>(reader, dataset), {}};

@@ -97,11 +97,11 @@ TEST_F(MesoCommands, LargeMapsAreHeightsAlone) {
     EXPECT_EQ(told["texels"], Json::array({4104, 4104}));
     EXPECT_TRUE(told["grid"].is_null());
     EXPECT_LT(told["file_bytes"], 2 * 4104 * 4104 + 1000);
-    const auto draw = [&](const std::string& rest) {
+    const auto draw = [&](const std::string& rest, const std::string& options = {}) {
         std::ofstream(path("scene.json"))
             << R"({"mesostructure": [{"asset": "large.meso", "tiles": 1, "method": )" << rest << "}]}";
         return run("render " + path("scene.json") + " --size 64x48 --samples 1 --json -o " + path("large.png") +
-                   " --overwrite");
+                   " --overwrite" + options);
     };
     const Ran drawn = draw(R"("remesh")");
     ASSERT_EQ(drawn.status, 0) << drawn.err;
@@ -109,8 +109,11 @@ TEST_F(MesoCommands, LargeMapsAreHeightsAlone) {
     EXPECT_GT(figures["remeshed_pixels"], 0);
     EXPECT_LE(figures["remeshed_pixels"], 0.5);
     EXPECT_GT(figures["surface_bytes"], 2 * 4104 * 4104);
-    EXPECT_NE(drawn.err.find("casts no shadows: rays are marched over at most 4096 texels"), std::string::npos)
-        << drawn.err;
+    const std::string shadowless = "casts no shadows: rays are marched over at most 4096 texels";
+    EXPECT_EQ(drawn.err.find(shadowless), std::string::npos) << "nobody asked for any: " << drawn.err;
+    const Ran shaded = draw(R"("remesh")", " --shadows");
+    EXPECT_EQ(shaded.status, 0);
+    EXPECT_NE(shaded.err.find(shadowless), std::string::npos) << shaded.err;
     const Ran marched = draw(R"("boxes")");
     EXPECT_EQ(marched.status, 1);
     EXPECT_NE(marched.err.find("at most 4096"), std::string::npos) << marched.err;
