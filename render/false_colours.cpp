@@ -1,7 +1,7 @@
 #include "render/false_colours.h"
 
+#include "render/frame_setup.h"
 #include "render/host/hit_light.h"
-#include "render/shared/frame.h"
 #include "render/shared/meso_view.h"
 
 namespace vcp {
@@ -14,18 +14,7 @@ bool hasHitNumbers(ShadingMode mode) { return isFalseColour(mode) || mode == Sha
 
 glm::vec3 falseColour(double part) { return f32::heat(float(part)); }
 
-double falseColourEnd(ShadingMode mode) {
-    switch (mode) {
-        case ShadingMode::Steps:
-            return frame::kMostShownSteps;
-        case ShadingMode::Cells:
-            return frame::kMostShownCells;
-        case ShadingMode::Fetches:
-            return frame::kMostShownFetches;
-        default:
-            return 1;
-    }
-}
+double falseColourEnd(ShadingMode mode) { return double(mostShown(shadingMode(mode))); }
 
 double reliefColourEnd() { return frame::kMesoHottest; }
 

@@ -23,32 +23,6 @@ namespace {
 /// Encodes a colour for the screen with a plain power, as in shade.comp.
 glm::vec4 encoded(glm::vec3 linear) { return glm::vec4(glm::pow(glm::max(linear, 0.0f), glm::vec3(1 / 2.2f)), 0); }
 
-frame::uint shadingMode(ShadingMode mode) {
-    switch (mode) {
-        case ShadingMode::Lit:
-            return frame::kShadeLit;
-        case ShadingMode::Clay:
-            return frame::kShadeClay;
-        case ShadingMode::Unlit:
-            return frame::kShadeUnlit;
-        case ShadingMode::Normals:
-            return frame::kShadeNormals;
-        case ShadingMode::Steps:
-            return frame::kShadeSteps;
-        case ShadingMode::Cells:
-            return frame::kShadeCells;
-        case ShadingMode::Fetches:
-            return frame::kShadeFetches;
-        case ShadingMode::Level:
-            return frame::kShadeLevel;
-        case ShadingMode::Error:
-            return frame::kShadeError;
-        case ShadingMode::Wireframe:
-            return frame::kShadeWireframe;
-    }
-    return frame::kShadeLit;
-}
-
 /// The directions of the picture's corner and of a step of a pixel.
 struct PicturePlane {
     glm::dvec3 corner, stepX, stepY;
@@ -143,6 +117,32 @@ bool castsShadows(const Shading& shading) {
     const std::vector<DirectedLight> lights = lightsOf(shading);
     return shading.shadows && areLightsOn(shading) &&
            std::any_of(lights.begin(), lights.end(), [](const DirectedLight& light) { return light.strength > 0; });
+}
+
+uint32_t shadingMode(ShadingMode mode) {
+    switch (mode) {
+        case ShadingMode::Lit:
+            return frame::kShadeLit;
+        case ShadingMode::Clay:
+            return frame::kShadeClay;
+        case ShadingMode::Unlit:
+            return frame::kShadeUnlit;
+        case ShadingMode::Normals:
+            return frame::kShadeNormals;
+        case ShadingMode::Steps:
+            return frame::kShadeSteps;
+        case ShadingMode::Cells:
+            return frame::kShadeCells;
+        case ShadingMode::Fetches:
+            return frame::kShadeFetches;
+        case ShadingMode::Level:
+            return frame::kShadeLevel;
+        case ShadingMode::Error:
+            return frame::kShadeError;
+        case ShadingMode::Wireframe:
+            return frame::kShadeWireframe;
+    }
+    return frame::kShadeLit;
 }
 
 uint32_t hitPlanes(const FrameRequest& request, bool colour) {

@@ -43,6 +43,9 @@ enum class SectionKind : uint32_t { None, Open, Capped, ClosedCapped };
 /// `caps`: capsOf(), of a dataset.
 SectionKind sectionKind(const FrameRequest& request, Caps caps);
 
+/// Returns the mode as shaders get it (FrameConstants::shadingMode).
+uint32_t shadingMode(ShadingMode mode);
+
 /// Words that a pixel's hit takes: depth, normal, and where wanted colour, and light or the value of a false colour.
 uint32_t hitPlanes(const FrameRequest& request, bool colour);
 

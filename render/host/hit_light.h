@@ -46,6 +46,20 @@ private:
     std::vector<glm::vec3> spirals_;  // 16 a ray
 };
 
+/// Returns the number that the false colours of a FrameConstants::shadingMode end at: 1 where it is no count of work.
+inline float mostShown(uint32_t shadingMode) {
+    switch (shadingMode) {
+        case frame::kShadeSteps:
+            return frame::kMostShownSteps;
+        case frame::kShadeCells:
+            return frame::kMostShownCells;
+        case frame::kShadeFetches:
+            return frame::kMostShownFetches;
+        default:
+            return 1;
+    }
+}
+
 /// Returns a light as FrameConstants::lightDirection has it, and its bits of the part of the light that is seen, as the
 /// shaders have them.
 inline glm::vec4 lightNumbered(const frame::FrameConstants& frame, uint32_t number) {

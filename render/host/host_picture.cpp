@@ -104,12 +104,11 @@ private:
     /// Adds the work of a tile's rays to the picture's, and shows it of all rays that visited something.
     void drawWork(const TileHits& hits) {
         const TileWork& done = *hits.work;
-        const bool isSteps = frame_.shadingMode == frame::kShadeSteps,
-                   isCells = frame_.shadingMode == frame::kShadeCells;
-        const uint32_t* const shown = isSteps ? done.steps : isCells ? done.cells : done.fetches;
-        const float most = isSteps   ? frame::kMostShownSteps
-                           : isCells ? frame::kMostShownCells
-                                     : frame::kMostShownFetches;
+        const uint32_t mode = frame_.shadingMode;
+        const uint32_t* const shown = mode == frame::kShadeSteps   ? done.steps
+                                      : mode == frame::kShadeCells ? done.cells
+                                                                   : done.fetches;
+        const float most = mostShown(mode);
         forEachPixel(picture_.size, hits.corner, [&](glm::ivec2 pixel, int i) {
             if (done.steps[i] == 0) return;
             uint32_t& work = picture_.work[at(pixel)];
