@@ -68,7 +68,8 @@ public:
     DECIMATING_MODULE(SurfaceModule, MeshT, Surface)
 
     explicit SurfaceModule(MeshT& mesh) : Base(mesh, false) {}
-    void use(MovingMap& map) { map_ = &map; }
+    /// `weights`: of the faces; empty: 1.
+    void use(MovingMap& map, std::vector<float> weights) { map_ = &map, weights_ = std::move(weights); }
 
     void initialize() override {
         MeshT& mesh = this->mesh();
@@ -76,7 +77,8 @@ public:
         for (const auto face : mesh.faces()) {
             const Point normal = mesh.calc_face_normal(face);
             const auto first = mesh.halfedge_handle(face);
-            const double area = mesh.calc_sector_area(first);
+            const double weight = weights_.empty() ? 1 : double(weights_[size_t(face.idx())]);
+            const double area = weight * mesh.calc_sector_area(first);
             if (!(area > 0)) continue;
             const Point place = mesh.point(mesh.to_vertex_handle(first));
             for (auto vertex = mesh.cfv_iter(face); vertex.is_valid(); ++vertex) {
@@ -86,7 +88,7 @@ public:
             auto side = first;
             for (int k = 0; k < 3; ++k, side = mesh.next_halfedge_handle(side))
                 if (mesh.is_boundary(mesh.edge_handle(side)) || mesh.status(mesh.edge_handle(side)).feature())
-                    holdEdge(side, normal);
+                    holdEdge(side, normal, weight);
         }
     }
 
@@ -107,14 +109,14 @@ public:
 private:
     void add(VertexHandle vertex, const Quadric& quadric) { quadrics_[size_t(vertex.idx())] += quadric; }
 
-    void holdEdge(HalfedgeHandle side, const Point& normal) {
+    void holdEdge(HalfedgeHandle side, const Point& normal, double weight) {
         MeshT& mesh = this->mesh();
         const Point along = mesh.calc_edge_vector(side);
         Point across = normal % along;
         const double length = across.norm();
         if (!(length > 0)) return;
         across /= length;
-        const Quadric quadric = Quadric(across, mesh.point(mesh.to_vertex_handle(side))) * along.sqrnorm();
+        const Quadric quadric = Quadric(across, mesh.point(mesh.to_vertex_handle(side))) * (weight * along.sqrnorm());
         add(mesh.to_vertex_handle(side), quadric), add(mesh.from_vertex_handle(side), quadric);
     }
 
@@ -160,6 +162,7 @@ private:
     }
 
     std::vector<Quadric> quadrics_;
+    std::vector<float> weights_;
     MovingMap* map_ = nullptr;
 };
 
@@ -257,7 +260,10 @@ Result<BaseSurface> decimated(const BaseSurface& surface, const DecimationOption
     markSeams(surface, linked);
     SurfaceModule<HalfEdges>::Handle module;
     decimater.add(module);
-    decimater.module(module).use(map);
+    std::vector<float> weights;
+    if (!options.weights.empty())
+        for (const uint32_t triangle : linked.triangleOf) weights.push_back(options.weights[triangle]);
+    decimater.module(module).use(map, std::move(weights));
     if (!decimater.initialize()) return Error{.message = "the mesh cannot be decimated"};
     Progress progress(options, (mesh.n_faces() - std::min(options.triangles, mesh.n_faces())) / 2);
     decimater.set_observer(&progress);

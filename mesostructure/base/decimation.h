@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <functional>
+#include <span>
 
 #include "mesostructure/base_surface.h"
 
@@ -11,6 +12,8 @@ namespace vcp::meso {
 
 struct DecimationOptions {
     size_t triangles = 0;  ///< to be reached or gone below by one
+    /// Of each triangle of the surface, how many times its own changes count; empty: once. They outlive the call.
+    std::span<const float> weights = {};
     /// Takes the part that is done, from 0 to 1; returning false cancels.
     std::function<bool(double fraction)> progress = {};
 };

@@ -9,11 +9,10 @@
 
 #include "builder/measure/mesh_deviation.h"
 #include "mesostructure/asset_file.h"
-#include "mesostructure/base/decimation.h"
-#include "mesostructure/base/manifold_part.h"
 #include "mesostructure/base/surface_edges.h"
 #include "mesostructure/shell.h"
 #include "viewer/bake/bake_files.h"
+#include "viewer/bake/decimated_base.h"
 #include "viewer/bake/displaced_mesh.h"
 #include "viewer/export/surface_mesh.h"
 #include "viewer/scene/base_mesh.h"
@@ -24,16 +23,18 @@ namespace {
 
 using namespace meso;
 
-constexpr uint64_t kMostOfBase = 1'000'000, kMeasured = 200'000, kForReach = 50'000;
+constexpr uint64_t kMostOfBase = 1'000'000, kMeasured = 200'000;
+/// Memory for each triangle of a scan that is held, once as it was read and once joined.
+constexpr uint64_t kHeldBytes = 200;
 
 /// Where the parts of the work lie in the whole.
 struct Part {
     const char* name;
     double from, to;
 };
-constexpr Part kReading{"reading the scan", 0, 0.1}, kDecimating{"collapsing edges", 0.1, 0.3},
-    kReaching{"measuring the base", 0.3, 0.32}, kSampling{"sampling", 0.32, 0.85}, kWriting{"writing", 0.85, 0.9},
-    kMeasuring{"measuring", 0.9, 0.95}, kMeasuringBack{"measuring back", 0.95, 1};
+constexpr Part kReading{"reading the scan", 0, 0.1}, kDecimating{"making the base", 0.1, 0.4},
+    kSampling{"sampling", 0.4, 0.85}, kWriting{"writing", 0.85, 0.9}, kMeasuring{"measuring", 0.9, 0.95},
+    kMeasuringBack{"measuring back", 0.95, 1};
 
 /// An error of the base is said with the base's name.
 Error named(Error error, const std::string& name) {
@@ -120,40 +121,17 @@ private:
     }
 
     Result<void> decimateScan() {
-        BaseSurface surface{scan_.mesh.positions, scan_.mesh.triangles, {}};
-        joinPositions(surface);
-        figures_.leftOut = keepManifoldPart(surface);
-        auto made = decimated(surface, {.triangles = options_.triangles, .progress = progress(kDecimating)});
+        auto made = decimateToFollow(reader_, dataset_, scan_.mesh,
+                                     {.triangles = options_.triangles,
+                                      .texels = options_.texels,
+                                      .reach = options_.reach,
+                                      .memoryBytes = options_.memoryBytes - kHeldBytes * scan_.mesh.triangles.size(),
+                                      .progress = progress(kDecimating)});
         if (!made) return named(made.error(), reader_->name());
-        base_ = *std::move(made);
-        keepDrawable();
-        if (base_.triangles.empty())
-            return Error{.code = ErrorCode::InvalidInput,
-                         .message = "nothing of it is a surface with an outside; give a base of your own",
-                         .file = reader_->name()};
-        if (options_.reach > 0) {
-            figures_.reach = options_.reach;
-            return {};
-        }
-        const IndexedMesh mesh{base_.positions, base_.triangles, {}};
-        const DeviationTarget target(mesh);
-        VCP_TRY_ASSIGN(const auto away,
-                       measureDeviation(scan_.mesh, target, {.samples = kForReach, .progress = progress(kReaching)}));
-        figures_.reach = std::max(1.5 * away.absoluteQuantile(1), 4 * dataset_.cellOf(dataset_.header.levels - 1));
+        base_ = std::move(made->surface);
+        figures_.leftOut = made->leftOut, figures_.reach = made->reach;
+        figures_.scanVertices = made->scanVertices, figures_.unlikeAtFirst = made->unlikeAtFirst;
         return {};
-    }
-
-    /// Leaves out what no scene draws: triangles on edges that have become one, and at corners whose normals cancel.
-    void keepDrawable() {
-        joinPositions(base_);
-        for (size_t before = 0; before != base_.triangles.size();) {
-            before = base_.triangles.size();
-            figures_.leftOut += keepManifoldPart(base_);
-            const std::vector<glm::dvec3> directions = shellDirections(base_);
-            figures_.leftOut += std::erase_if(base_.triangles, [&](const auto& t) {
-                return std::any_of(t.begin(), t.end(), [&](uint32_t v) { return directions[v] == glm::dvec3(0); });
-            });
-        }
     }
 
     Result<void> readBase() {

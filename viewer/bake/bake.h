@@ -31,6 +31,7 @@ struct BakeOptions {
 
 struct BakeFigures {
     uint64_t scanTriangles = 0, baseTriangles = 0;
+    uint64_t scanVertices = 0;  ///< where the scan is decimated
     /// Triangles without which a decimated base is made, of the scan or its own: a third one on an edge, or at a corner
     /// whose normals cancel.
     uint64_t leftOut = 0;
@@ -39,6 +40,8 @@ struct BakeFigures {
     double reach = 0;
     double offset = 0, range = 0;  ///< of the heights, world units
     BakedShares shares;
+    /// The part of a decimated base that was no height field before it was made to follow the scan.
+    double unlikeAtFirst = 0;
     uint64_t bytes = 0;                               ///< of all files
     uint64_t baseBytes = 0, heightBytes = 0;          ///< of base.obj and heights.meso, which the scene needs
     std::optional<Quantiles> scanToBase, baseToScan;  ///< where measured: sizes of distances, world units

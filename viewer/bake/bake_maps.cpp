@@ -163,12 +163,14 @@ private:
         std::vector<uint32_t> counts(base_.triangles.size(), 0);
         for (const uint32_t texel : sampled_)
             if (isInside(texel)) ++counts[owners_[texel]];
+        made_.isField.assign(base_.triangles.size(), true);
         std::array<double, 5> areas{};
         for (size_t i = 0; i < sampled_.size(); ++i) {
             const size_t texel = sampled_[i];
             if (!isInside(texel)) continue;
             const TexelState state = stateOf(texel, hits_[i]);
             made_.states[texel] = state;
+            if (state != TexelState::Height) made_.isField[owners_[texel]] = false;
             areas[size_t(state)] += areaOf(base_, owners_[texel]) / double(counts[owners_[texel]]);
         }
         const double all = areas[1] + areas[2] + areas[3] + areas[4];

@@ -49,6 +49,7 @@ struct BakedMaps {
     std::vector<glm::vec3> light;    ///< linear colours; empty without colour
     std::vector<TexelState> states;
     BakedShares shares;
+    std::vector<bool> isField;  ///< of each triangle of the base: whether no texel of it says otherwise
 };
 
 struct BakeMapsOptions {

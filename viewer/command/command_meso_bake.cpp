@@ -33,6 +33,9 @@ struct BakeMeso {
 
 Json toJson(const Quantiles& q) { return {{"p50", q.p50}, {"p95", q.p95}, {"p99", q.p99}, {"max", q.max}}; }
 
+/// Bytes of the scan's mesh as a binary PLY: three floats a vertex, a count and three numbers a triangle.
+uint64_t meshBytes(const BakeFigures& f) { return 12 * f.scanVertices + 13 * f.scanTriangles; }
+
 Json toJson(const BakeMeso& command, const BakeFigures& f, uint64_t scanBytes, double seconds) {
     Json json = {{"output", command.out},
                  {"triangles_of_scan", f.scanTriangles},
@@ -47,10 +50,12 @@ Json toJson(const BakeMeso& command, const BakeFigures& f, uint64_t scanBytes, d
                  {"no_hit", f.shares.noHit},
                  {"several_sheets", f.shares.sheets},
                  {"steep", f.shares.steep},
+                 {"no_height_field_at_first", f.unlikeAtFirst},
                  {"bytes", f.bytes},
                  {"base_bytes", f.baseBytes},
                  {"height_bytes", f.heightBytes},
                  {"scan_bytes", scanBytes}};
+    if (f.scanVertices > 0) json["mesh_bytes"] = meshBytes(f);
     if (f.scanToBase) json["scan_to_base"] = toJson(*f.scanToBase);
     if (f.baseToScan) json["base_to_scan"] = toJson(*f.baseToScan);
     json["seconds"] = seconds;
@@ -59,14 +64,18 @@ Json toJson(const BakeMeso& command, const BakeFigures& f, uint64_t scanBytes, d
 
 std::string summary(const BakeMeso& command, const BakeFigures& f, uint64_t scanBytes, double diagonal) {
     const int n = command.options.texels;
+    const std::string mesh = f.scanVertices == 0 ? "" : fmt::format(", {} of its mesh", formatBytes(meshBytes(f)));
     std::string text = fmt::format(
-        "{}: {} triangles for {}, maps of {} x {} texels, {} ({} of the scan)\n"
+        "{}: {} triangles for {}, maps of {} x {} texels, {} ({} of the scan{})\n"
         "  heights from {} to {} along the base's normals, looked for up to {}\n"
         "  a height field over {:.2f} % of the base; no hit {:.2f} %, several sheets {:.2f} %, steep {:.2f} % "
         "(mask.png)",
         command.out, formatCount(f.baseTriangles), formatCount(f.scanTriangles), n, n, formatBytes(f.bytes),
-        formatBytes(scanBytes), formatLength(f.offset), formatLength(f.offset + f.range), formatLength(f.reach),
+        formatBytes(scanBytes), mesh, formatLength(f.offset), formatLength(f.offset + f.range), formatLength(f.reach),
         100 * f.shares.height, 100 * f.shares.noHit, 100 * f.shares.sheets, 100 * f.shares.steep);
+    if (f.unlikeAtFirst > 1 - f.shares.height)
+        text += fmt::format("\n  before the base was made to follow the scan, it was none over {:.2f} %",
+                            100 * f.unlikeAtFirst);
     if (f.leftOut > 0)
         text += fmt::format(
             "\n  the base is made without {} triangles of the scan, on edges of more than two or without an outside",

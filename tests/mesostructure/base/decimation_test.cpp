@@ -56,6 +56,25 @@ int64_t euler(const BaseSurface& s) {
     return int64_t(s.positions.size()) - int64_t(edges.all) + int64_t(edges.triangles);
 }
 
+TEST(Decimation, WhatCountsMoreKeepsMoreTriangles) {
+    BaseSurface sphere = shape("sphere");
+    sphere.uvs.clear();
+    const auto above = [](const BaseSurface& s) {
+        return std::ranges::count_if(s.triangles, [&](const auto& t) {
+            return s.positions[t[0]].z + s.positions[t[1]].z + s.positions[t[2]].z > 0;
+        });
+    };
+    std::vector<float> weights;
+    for (const auto& t : sphere.triangles)
+        weights.push_back(sphere.positions[t[0]].z + sphere.positions[t[1]].z > 0 ? 64.0f : 1.0f);
+    const auto even = decimated(sphere, {.triangles = 200});
+    const auto above64 = decimated(sphere, {.triangles = 200, .weights = weights});
+    ASSERT_TRUE(even && above64);
+    EXPECT_NEAR(double(above(*even)), 100, 15);
+    EXPECT_GT(above(*above64), 140);
+    EXPECT_EQ(edgesOf(*above64)->border, 0u);
+}
+
 TEST(Decimation, AClosedSurfaceStaysClosedAndNear) {
     BaseSurface sphere = shape("sphere"), torus = shape("torus");
     sphere.uvs.clear(), torus.uvs.clear();

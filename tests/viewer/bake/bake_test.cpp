@@ -277,6 +277,58 @@ TEST(Bake, WhatIsNoHeightFieldIsCounted) {
     EXPECT_NE(nothing.maps.error().message.find("not one line"), std::string::npos);
 }
 
+/// A ball with a small one on a stalk.
+IndexedMesh mushroom() {
+    std::vector<dvec2> profile;  // radius and height, from the bottom
+    for (int i = 1; i <= 60; ++i) {
+        const double turn = M_PI - i * (M_PI - 0.1) / 60;
+        profile.emplace_back(std::sin(turn), std::cos(turn));
+    }
+    for (int i = 1; i <= 4; ++i) profile.emplace_back(0.06, 1 + 0.03 * i);
+    for (int i = 1; i < 40; ++i) {
+        const double turn = M_PI - 0.3 - i * (M_PI - 0.3) / 40;
+        profile.emplace_back(0.2 * std::sin(turn), 1.31 + 0.2 * std::cos(turn));
+    }
+    constexpr uint32_t kAround = 64;
+    IndexedMesh mesh;
+    for (const dvec2 p : profile)
+        for (uint32_t i = 0; i < kAround; ++i) {
+            const double turn = 2 * M_PI * i / kAround;
+            mesh.positions.emplace_back(p.x * std::cos(turn), p.x * std::sin(turn), p.y);
+        }
+    const auto bottom = uint32_t(mesh.positions.size()), top = bottom + 1;
+    mesh.positions.emplace_back(0, 0, -1), mesh.positions.emplace_back(0, 0, 1.51);
+    const auto rings = uint32_t(profile.size());
+    for (uint32_t i = 0; i < kAround; ++i) {
+        const uint32_t next = (i + 1) % kAround, last = kAround * (rings - 1);
+        mesh.triangles.push_back({bottom, next, i}), mesh.triangles.push_back({top, last + i, last + next});
+        for (uint32_t j = 0; j + 1 < rings; ++j) {
+            const uint32_t a = kAround * j + i, b = kAround * j + next;
+            mesh.triangles.push_back({a, b, b + kAround}), mesh.triangles.push_back({a, b + kAround, a + kAround});
+        }
+    }
+    return mesh;
+}
+
+TEST(Bake, ABaseFollowsWhatWouldBeNoHeightField) {
+    const test::BuiltMesh scan(mushroom(), 1.0 / 16);
+    ASSERT_TRUE(scan.ok());
+    const TestFolder folder("vcp_bake_test");
+    const std::shared_ptr<const ByteReader> reader = *openFile(scan.file());
+    std::vector<double> told;
+    const auto figures = bake(reader, scan.cache().dataset(), folder.path(),
+                              {.triangles = 120, .texels = 256, .progress = [&](std::string_view, double fraction) {
+                                   told.push_back(fraction);
+                                   return true;
+                               }});
+    ASSERT_TRUE(figures) << figures.error().line();
+    EXPECT_LE(figures->baseTriangles, 120u);
+    EXPECT_GT(figures->unlikeAtFirst, 0.002);
+    EXPECT_LT(1 - figures->shares.height, 0.5 * figures->unlikeAtFirst);
+    EXPECT_TRUE(std::ranges::is_sorted(told));
+    EXPECT_EQ(figures->scanVertices, mushroom().positions.size());
+}
+
 TEST(Bake, WhatIsWrittenIsTheScan) {
     const IndexedMesh sphere = bumpySphere(70);
     const test::BuiltMesh scan(sphere, 1.0 / 16);
