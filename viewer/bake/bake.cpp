@@ -130,7 +130,8 @@ private:
         if (!made) return named(made.error(), reader_->name());
         base_ = std::move(made->surface);
         figures_.leftOut = made->leftOut, figures_.reach = made->reach;
-        figures_.scanVertices = made->scanVertices, figures_.unlikeAtFirst = made->unlikeAtFirst;
+        figures_.scanVertices = made->scanVertices;
+        figures_.unlike = made->unlike, figures_.unlikeAtFirst = made->unlikeAtFirst;
         return {};
     }
 

@@ -40,8 +40,7 @@ struct BakeFigures {
     double reach = 0;
     double offset = 0, range = 0;  ///< of the heights, world units
     BakedShares shares;
-    /// The part of a decimated base that was no height field before it was made to follow the scan.
-    double unlikeAtFirst = 0;
+    double unlike = 0, unlikeAtFirst = 0;             ///< of a decimated base, as DecimatedBase has them
     uint64_t bytes = 0;                               ///< of all files
     uint64_t baseBytes = 0, heightBytes = 0;          ///< of base.obj and heights.meso, which the scene needs
     std::optional<Quantiles> scanToBase, baseToScan;  ///< where measured: sizes of distances, world units

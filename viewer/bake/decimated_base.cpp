@@ -34,16 +34,15 @@ public:
         leftOut_ = keepManifoldPart(surface_);
         DecimatedBase best;
         std::vector<float> weights;
-        for (round_ = 0; round_ <= kRounds; ++round_) {
+        for (;; ++round_) {
             VCP_TRY_ASSIGN(DecimatedBase next, decimate(weights));
             VCP_TRY_ASSIGN(const std::vector<bool> isField, tryMaps(next));
             next.unlikeAtFirst = round_ == 0 ? next.unlike : best.unlikeAtFirst;
-            if (round_ > 0 && next.unlike >= best.unlike) break;
+            if (round_ > 0 && next.unlike >= best.unlike) return best;
             best = std::move(next);
-            if (best.unlike <= kFollowed || round_ == kRounds) break;
+            if (best.unlike <= kFollowed || round_ == kRounds) return best;
             VCP_TRY(weigh(best.surface, isField, weights));
         }
-        return best;
     }
 
 private:
@@ -93,10 +92,12 @@ private:
 
     /// Returns over which triangles of a base small maps find a height field.
     Result<std::vector<bool>> tryMaps(DecimatedBase& base) {
-        const int quarter = std::max(options_.texels / 4, 8), half = std::max(options_.texels / 2, 8);
-        auto map = makeAtlas(base.surface, quarter);
-        if (!map) map = makeAtlas(base.surface, half);
-        if (!map) map = makeAtlas(base.surface, options_.texels);
+        int texels = std::max(options_.texels / 4, 8);
+        auto map = makeAtlas(base.surface, texels);
+        while (!map && texels < options_.texels) {
+            texels = std::min(2 * texels, options_.texels);
+            map = makeAtlas(base.surface, texels);
+        }
         if (!map) return map.error();
         const std::vector<glm::dvec3> directions = shellDirections(base.surface);
         const BaseFrames frames = framesOf(base.surface, *map, directions);

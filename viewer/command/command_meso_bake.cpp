@@ -50,7 +50,8 @@ Json toJson(const BakeMeso& command, const BakeFigures& f, uint64_t scanBytes, d
                  {"no_hit", f.shares.noHit},
                  {"several_sheets", f.shares.sheets},
                  {"steep", f.shares.steep},
-                 {"no_height_field_at_first", f.unlikeAtFirst},
+                 {"tried_at_first", f.unlikeAtFirst},
+                 {"tried_at_last", f.unlike},
                  {"bytes", f.bytes},
                  {"base_bytes", f.baseBytes},
                  {"height_bytes", f.heightBytes},
@@ -73,9 +74,10 @@ std::string summary(const BakeMeso& command, const BakeFigures& f, uint64_t scan
         command.out, formatCount(f.baseTriangles), formatCount(f.scanTriangles), n, n, formatBytes(f.bytes),
         formatBytes(scanBytes), mesh, formatLength(f.offset), formatLength(f.offset + f.range), formatLength(f.reach),
         100 * f.shares.height, 100 * f.shares.noHit, 100 * f.shares.sheets, 100 * f.shares.steep);
-    if (f.unlikeAtFirst > 1 - f.shares.height)
-        text += fmt::format("\n  before the base was made to follow the scan, it was none over {:.2f} %",
-                            100 * f.unlikeAtFirst);
+    if (f.unlikeAtFirst > f.unlike)
+        text += fmt::format(
+            "\n  the base was made to follow the scan: by small maps, it was none over {:.2f} %, now {:.2f} %",
+            100 * f.unlikeAtFirst, 100 * f.unlike);
     if (f.leftOut > 0)
         text += fmt::format(
             "\n  the base is made without {} triangles of the scan, on edges of more than two or without an outside",

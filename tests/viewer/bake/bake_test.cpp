@@ -324,6 +324,7 @@ TEST(Bake, ABaseFollowsWhatWouldBeNoHeightField) {
     ASSERT_TRUE(figures) << figures.error().line();
     EXPECT_LE(figures->baseTriangles, 120u);
     EXPECT_GT(figures->unlikeAtFirst, 0.002);
+    EXPECT_LT(figures->unlike, 0.5 * figures->unlikeAtFirst);
     EXPECT_LT(1 - figures->shares.height, 0.5 * figures->unlikeAtFirst);
     EXPECT_TRUE(std::ranges::is_sorted(told));
     EXPECT_EQ(figures->scanVertices, mushroom().positions.size());
