@@ -35,6 +35,8 @@ struct FrameStats {
     /// nothing is certified.
     double remeshedPixels = 0;
     uint64_t uncertifiedPatches = 0;
+    uint64_t heightBytes = 0;     ///< of surfaceBytes: heights of remeshed surfaces that are there, tile by tile
+    uint32_t missingHeights = 0;  ///< tiles of heights that the frame read coarser ones for; then nothing is certified
     /// This frame's submissions, with those that present it before it has ended, and how often the CPU waited for one.
     uint64_t submissions = 0, hostWaits = 0;
     bool onHost = false;          ///< the processor cast the rays itself, and no shader ran (RendererOptions::hostRays)

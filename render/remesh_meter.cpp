@@ -148,12 +148,12 @@ struct Patches {
         return {};
     }
     /// Binds levels and pieces, a set a batch.
-    Result<void> bind(const std::vector<RemeshSwept>& swept, const MesoTexels& levels) {
+    Result<void> bind(const std::vector<RemeshSwept>& swept, const HeightPool& heights) {
         sets.clear();
         for (const RemeshSwept& batch : swept) {
             const VkDescriptorPoolSize size{kTexels, 2};
             VCP_TRY_ASSIGN(auto owner, allocateSet(device, setLayout, std::span(&size, 1)));
-            const VkBufferView views[] = {levels.quads.handle(), batch.quadsView.handle()};
+            const VkBufferView views[] = {heights.view(), batch.quadsView.handle()};
             VkWriteDescriptorSet write{VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET};
             write.dstSet = owner.set;
             write.descriptorCount = 1;
@@ -184,6 +184,11 @@ struct RemeshMeter::State {
     RasterTarget target;
     Buffer hits;
 
+    Result<std::unique_ptr<HeightPool>> heightsOf(std::shared_ptr<const meso::HeightLevels> heights) const {
+        VCP_TRY_ASSIGN(auto pool, HeightPool::create(*device, std::move(heights)));
+        VCP_TRY(pool->loadAll());
+        return pool;
+    }
     Result<void> prepareTarget(uint32_t width, uint32_t height) {
         if (!triangles.exists()) {
             VCP_TRY_ASSIGN(triangles, createRemeshPipeline(*device));
@@ -205,7 +210,7 @@ struct RemeshMeter::State {
                      const meso::HeightLevels& heights) const {
         const RasterPipeline& pipeline = patches.pipeline;
         pipeline.begin(commands, target.framebuffer(), target.size());
-        const PushedPatch pushed{projection, pieces.view, uint32_t(heights.levels().size()),
+        const PushedPatch pushed{projection, pieces.view, uint32_t(heights.used()),
                                  uint32_t(heights.levels().front().size.x)};
         vkCmdPushConstants(commands, pipeline.layout(), pipeline.pushStages(), 0, sizeof pushed, &pushed);
         for (size_t i = 0; i < swept.size(); ++i) {
@@ -245,7 +250,7 @@ const DeviceInfo& RemeshMeter::device() const { return state_->device->info(); }
 Result<RemeshTimes> RemeshMeter::measure(const meso::RemeshSurface& surface, const meso::RemeshCamera& camera,
                                          const meso::RemeshOptions& options, int rounds) {
     return timed(
-        *surface.heights,
+        surface.heights,
         [&] { return meso::makeRemeshPieces(surface, camera, options, state_->pieces, state_->pass->limits()); },
         rounds);
 }
@@ -253,23 +258,24 @@ Result<RemeshTimes> RemeshMeter::measure(const meso::RemeshSurface& surface, con
 Result<RemeshTimes> RemeshMeter::measure(meso::CertifiedCells& cells, const meso::RemeshCamera& camera,
                                          const meso::RemeshOptions& options, int rounds) {
     return timed(
-        *cells.patches().heights,
+        cells.patches().heights,
         [&] { return meso::makeRemeshPieces(cells, camera, options, state_->pieces, state_->pass->limits()); }, rounds);
 }
 
 template <class Make>
-Result<RemeshTimes> RemeshMeter::timed(const meso::HeightLevels& heights, const Make& make, int rounds) {
+Result<RemeshTimes> RemeshMeter::timed(const std::shared_ptr<const meso::HeightLevels>& heights, const Make& make,
+                                       int rounds) {
     State& s = *state_;
-    VCP_TRY_ASSIGN(const auto levels, s.resources->quads(meso::RemeshLevelBytes(heights).parts()));
+    VCP_TRY_ASSIGN(const auto pool, s.heightsOf(heights));
     std::vector<double> pieces, sweeps, processor;
     for (int round = 0; round <= rounds; ++round) {
         const double start = processorMs();
         VCP_TRY(make());
-        VCP_TRY(s.pass->prepare(s.swept, s.pieces, levels));
+        VCP_TRY(s.pass->prepare(s.swept, s.pieces, *pool));
         const double prepared = processorMs();
         VCP_TRY_ASSIGN(const double ms, s.timer.timed(*s.device, [&](VkCommandBuffer commands) {
             barrierToAll(commands);
-            s.pass->record(commands, s.swept, heights, s.pieces.view);
+            s.pass->record(commands, s.swept, *heights, s.pieces.view);
         }));
         if (round == 0) continue;
         pieces.push_back(prepared - start), sweeps.push_back(ms), processor.push_back(processorMs() - prepared);
@@ -293,13 +299,13 @@ Result<RemeshDrawn> RemeshMeter::draw(const meso::RemeshSurface& surface, const 
         return Error{.code = ErrorCode::Unsupported, .message = "'" + device().name + "' has no tessellator"};
     meso::RemeshOptions cut = options;
     if (!sweeps) cut.mostCells = std::min(options.mostCells, kMostTessellated);
-    VCP_TRY_ASSIGN(const auto levels, s.resources->quads(meso::RemeshLevelBytes(*surface.heights).parts()));
+    VCP_TRY_ASSIGN(const auto pool, s.heightsOf(surface.heights));
     VCP_TRY(s.prepareTarget(width, height));
     VCP_TRY(meso::makeRemeshPieces(surface, camera, cut, s.pieces, s.pass->limits()));
-    VCP_TRY(s.pass->prepare(s.swept, s.pieces, levels));
+    VCP_TRY(s.pass->prepare(s.swept, s.pieces, *pool));
     if (!sweeps) {
         VCP_TRY(s.patches.create(*s.device));
-        VCP_TRY(s.patches.bind(s.swept, levels));
+        VCP_TRY(s.patches.bind(s.swept, *pool));
     }
     const RemeshProjection projection = projectionOf(camera);
     std::vector<double> times, processor;

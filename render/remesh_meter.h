@@ -65,7 +65,7 @@ public:
 private:
     struct State;
     template <class Make>
-    Result<RemeshTimes> timed(const meso::HeightLevels& heights, const Make& make, int rounds);
+    Result<RemeshTimes> timed(const std::shared_ptr<const meso::HeightLevels>& heights, const Make& make, int rounds);
     explicit RemeshMeter(std::unique_ptr<State> state);
     std::unique_ptr<State> state_;
 };

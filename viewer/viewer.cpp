@@ -59,6 +59,8 @@ bool sameView(const OrbitCamera& a, const OrbitCamera& b) {
 }  // namespace
 
 std::string remeshedText(const FrameStats& stats) {
+    if (stats.missingHeights > 0)
+        return "from coarser heights where " + formatCount(stats.missingHeights, "tile", "tiles") + " are not there";
     if (stats.remeshedPixels == 0 && stats.uncertifiedPatches == 0) return {};
     const std::string beyond = formatCount(stats.uncertifiedPatches, "patch", "patches") + " may be farther off";
     if (stats.remeshedPixels == 0) return beyond;

@@ -27,7 +27,10 @@ constexpr uint64_t kMostSmallPatches = uint64_t{3} << 19;
 constexpr double kManyPatches = 1 << 17;
 constexpr int kLog2Narrowest = 4, kLog2Widest = 8;  // texels of a patch's edge
 constexpr int kLog2FinestCells = 4;                 // finest cells of a texel's edge, at most
-constexpr int kLog2MostCells = 9;                   // of a patch's edge; two more bits are there for rounding
+// Texels of a cell's edge, of the level that its heights are from: with one, a view needs up to 15 % more vertices,
+// with two it needs no more than with the map's own heights.
+constexpr int kLog2TexelsOfACell = 1;
+constexpr int kLog2MostCells = 9;  // of a patch's edge; two more bits are there for rounding
 // What is known of a kind of patches is forgotten where it is more than so many combinations of steps, and one for
 // each.
 constexpr size_t kMostKnown = 64;
@@ -152,21 +155,34 @@ void CertifiedCells::addKinds() {
         kindOf_[i] = found->second;
         kinds_[found->second].patches.push_back(i);
     }
+    for (const auto& [a, b] : neighbours_) isJump_.push_back(kinds_[kindOf_[a]].mayJump || kinds_[kindOf_[b]].mayJump);
+}
+
+/// Returns the level that points of cells of a step have their heights from.
+int CertifiedCells::levelOf(int step) const {
+    return std::clamp(step - finest_ - kLog2TexelsOfACell, 0, patches_.heights->used() - 1);
+}
+
+void CertifiedCells::setEdge(PatchCells& cells, int side, uint32_t edge, int step) const {
+    cells.parts[side] = std::max(edgeParts_[edge] >> step, 1);
+    cells.levels[side] = cells.parts[side] == 1 || isJump_[edge] ? 0 : levelOf(step);
 }
 
 PatchCells CertifiedCells::evenly(size_t patch, int step) const {
-    PatchCells cells{step, {}};
-    for (int k = 0; k < 3; ++k) cells.parts[k] = std::max(edgeParts_[edges_[patch][size_t(k)]] >> step, 1);
+    PatchCells cells{.step = step};
+    for (int k = 0; k < 3; ++k) setEdge(cells, k, edges_[patch][size_t(k)], step);
+    cells.levels.w = kinds_[kindOf_[patch]].mayJump ? 0 : levelOf(step);
     return cells;
 }
 
 PatchCells CertifiedCells::cells(size_t patch) const {
-    PatchCells cells{coarsest_, {}};
+    PatchCells cells{.step = coarsest_};
     for (int k = 0; k < 3; ++k) {
         const uint32_t edge = edges_[patch][size_t(k)];
         cells.step = std::min(cells.step, edgeSteps_[edge]);
-        cells.parts[k] = std::max(edgeParts_[edge] >> edgeSteps_[edge], 1);
+        setEdge(cells, k, edge, edgeSteps_[edge]);
     }
+    cells.levels.w = kinds_[kindOf_[patch]].mayJump ? 0 : levelOf(cells.step);
     return cells;
 }
 
@@ -282,7 +298,7 @@ void CertifiedCells::sweepOver(size_t patch, const PatchCells& cells, Scratch& s
         if (const uint32_t seam = patches_.seams[patch][k]; seam != RemeshSurface::kNoSeam)
             piece.seams[k] = {true, dvec2(patches_.seamUvs[seam][0]), dvec2(patches_.seamUvs[seam][1])};
     }
-    piece.parts = cells.parts;
+    piece.parts = cells.parts, piece.levels = cells.levels;
     scratch.mesh.clear(), scratch.over.clear();
     const RemeshMath<double>::RemeshView flat{{1, 1, 1, 1}, 0, RemeshMath<double>::kRemeshMap};
     PieceSweep<double> sweep(patches_, {}, flat, scratch.mesh);
@@ -338,6 +354,10 @@ void CertifiedCells::measureBeyond(Kind& kind, Known& known, double enough, Scra
     sweepOver(kind.patches.front(), known.cells, scratch);
     double beyond = 0;
     for (auto& at : scratch.over) {
+        // Corners of a coarser level's heights are not on the map: no nearer does it come to them than to their place.
+        if (known.cells.levels != glm::ivec4(0))
+            for (const HeightCorner& corner : at)
+                beyond = std::max(beyond, std::abs(corner.height - patches_.heights->height(0, corner.at)));
         // How far heights are from the middle of the corners' says how far they are beyond them.
         const auto [least, most] = std::minmax({at[0].height, at[1].height, at[2].height});
         const double middle = 0.5 * (least + most), half = 0.5 * (most - least);

@@ -51,6 +51,8 @@ namespace vcp::meso {
 struct PatchCells {
     int step = 0;         ///< its cells are 2^step of the finest ones wide
     glm::ivec3 parts{1};  ///< of its edges, at most as many as they have cells
+    /// Of the heights: along its edges, and within. An edge's depends on the edge alone.
+    glm::ivec4 levels{0};
 
     bool operator==(const PatchCells&) const = default;
 };
@@ -115,6 +117,8 @@ private:
     [[nodiscard]] std::pair<double, double> rangeOf(size_t patch);
     [[nodiscard]] Seen seenIn(const View& view, size_t patch);
     [[nodiscard]] double pixels(const Seen& seen, double height, double across, const Reach& reach) const;
+    [[nodiscard]] int levelOf(int step) const;
+    void setEdge(PatchCells& cells, int side, uint32_t edge, int step) const;
     [[nodiscard]] PatchCells evenly(size_t patch, int step) const;
     void choosePixelStep(const View& view, size_t patch, Seen& seen) const;
     /// Returns the coarsest step that keeps what is allowed, and sets whether one does; else that of a pixel.
@@ -141,6 +145,7 @@ private:
     std::vector<std::array<uint32_t, 3>> edges_;       ///< of each patch, from corner k to the next
     std::vector<std::array<uint32_t, 2>> neighbours_;  ///< of each edge: one or two patches
     std::vector<int> edgeParts_, edgeSteps_;           ///< of each edge, parts among the finest cells
+    std::vector<bool> isJump_;                         ///< of each edge, whether a patch beside it may jump
     std::vector<double> heights_;                      ///< of the corners
     std::vector<Kind> kinds_;
     std::vector<uint32_t> kindOf_;  ///< of each patch

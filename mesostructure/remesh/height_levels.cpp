@@ -38,11 +38,14 @@ Result<HeightLevels> HeightLevels::build(HeightMap map, const LevelFitOptions& o
     made.rows_ = map.extent().y;
     made.levels_.push_back({map.size, std::move(map.texels)});
     made.volumes_.emplace_back();
-    while (made.levels_.back().size != glm::ivec2(1) && int(made.levels_.size()) < options.mostLevels) {
+    while (made.levels_.back().size != glm::ivec2(1)) {
         const glm::ivec2 below = made.levels_.back().size, size(std::max(below.x / 2, 1), std::max(below.y / 2, 1));
         LevelVolume volume;
-        HeightLevel level = levelOf(made.levels_, size, options, volume);
+        const bool isUsed = int(made.levels_.size()) < options.mostLevels;
+        HeightLevel level =
+            isUsed ? levelOf(made.levels_, size, options, volume) : averagedLevel(made.levels_.back(), size);
         made.levels_.push_back(std::move(level));
+        if (isUsed) made.used_ = int(made.levels_.size());
         made.volumes_.push_back(volume);
     }
     return made;

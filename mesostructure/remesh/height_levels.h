@@ -9,6 +9,7 @@
 #include <vector>
 
 #include <glm/vec2.hpp>
+#include <glm/vec4.hpp>
 
 #include "mesostructure/remesh/remesh_math.h"
 #include "mesostructure/shape.h"
@@ -45,8 +46,8 @@ struct LevelFitOptions {
     LevelFit fit = LevelFit::Least;
     double gap = 0.01;         ///< LevelFit::Least ends where volume and bound differ by this part
     int mostIterations = 400;  ///< for each level
-    /// Levels that are made, with the map. 1 is for atlases: coarser levels mix charts that have nothing to do with
-    /// each other.
+    /// Levels that heights are taken from, with the map. 1 is for atlases: coarser levels mix charts that have nothing
+    /// to do with each other. Those beyond are averages, and stand in for what a device has not got yet.
     int mostLevels = 32;
 };
 
@@ -57,6 +58,7 @@ public:
     static Result<HeightLevels> build(HeightMap map, const LevelFitOptions& options = {});
 
     [[nodiscard]] const std::vector<HeightLevel>& levels() const { return levels_; }
+    [[nodiscard]] int used() const { return used_; }  ///< levels that heights are taken from
     [[nodiscard]] const std::vector<LevelVolume>& volumes() const { return volumes_; }  ///< for each level
     [[nodiscard]] double rows() const { return rows_; }  ///< extent of the tile along y, tile units
     /// Texels of the map a tile unit, along x and y.
@@ -74,6 +76,7 @@ public:
 private:
     std::vector<HeightLevel> levels_;
     std::vector<LevelVolume> volumes_;
+    int used_ = 1;
     double rows_ = 1;
 };
 
@@ -100,8 +103,13 @@ struct StoredLevels {
         const HeightLevel& of = from->levels()[size_t(level)];
         return {of.texels.data(), of.size, {Real(of.size.x), Real(double(of.size.y) / from->rows())}};
     }
-    [[nodiscard]] int remeshLevels() const { return int(from->levels().size()); }
-    [[nodiscard]] static uint32_t remeshTexel(const RemeshLevel& level, int i) { return level.texels16[i]; }
+    [[nodiscard]] int remeshLevels() const { return from->used(); }
+    [[nodiscard]] static glm::uvec4 remeshTexels(const RemeshLevel& level, glm::ivec2 at) {
+        const uint16_t *low = level.texels16 + size_t(level.size.x) * size_t(at.y),
+                       *high = at.y + 1 < level.size.y ? low + level.size.x : level.texels16;
+        const int after = at.x + 1 < level.size.x ? at.x + 1 : 0;
+        return {low[at.x], low[after], high[at.x], high[after]};
+    }
 };
 
 template <class Real>

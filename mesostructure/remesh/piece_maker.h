@@ -116,7 +116,7 @@ private:
     }
     [[nodiscard]] Real heightAt(const Real2& uv, const Real3& position, const Real3& direction, Real density) {
         const Real texels = points_.remeshTexelsAt(position, density);
-        return points_.remeshHeightAt(points_.remeshHeightFootprint(texels), texels, uv, position, direction);
+        return points_.remeshHeightAt(points_.remeshHeightFootprint(texels, 0), texels, uv, position, direction);
     }
     void place(Corner& corner) const {
         corner.weight = 1 / Math::remeshDepth(view_.grid, corner.position);
@@ -149,7 +149,7 @@ private:
         const PatchCells chosen = cells_->cells(patch);
         const auto corners = cells_->corners(patch, chosen.step);
         for (size_t k = 0; k < 3; ++k) piece.corners[k].grid = corners[k], piece.corners[k].weight = 1;
-        piece.parts = chosen.parts;
+        piece.parts = chosen.parts, piece.levels = chosen.levels;
     }
 
     /// Hands on, drops or halves the last of the open pieces.

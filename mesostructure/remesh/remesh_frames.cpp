@@ -38,7 +38,7 @@ RemeshFrame remeshFrame(const RemeshSurface& surface, size_t triangle) {
 }
 
 std::vector<glm::vec4> remeshFrames(const RemeshSurface& surface, glm::dvec3 origin) {
-    std::vector<glm::vec4> quads{glm::vec4(float(surface.heights->levels().size()), 0, 0, 0)};
+    std::vector<glm::vec4> quads{glm::vec4(float(surface.heights->used()), 0, 0, 0)};
     quads.reserve(1 + RemeshMath<float>::kRemeshFrameQuads * surface.triangles.size());
     for (size_t i = 0; i < surface.triangles.size(); ++i) {
         const RemeshFrame frame = remeshFrame(surface, i);

@@ -11,6 +11,7 @@
 #include <glm/geometric.hpp>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
+#include <glm/vec4.hpp>
 
 namespace vcp::meso {
 
@@ -51,7 +52,7 @@ struct RemeshHeights : Levels {
     using Real = T;
     using Real2 = glm::vec<2, T>;
     using Real3 = glm::vec<3, T>;
-    using Levels::remeshLevel, Levels::remeshLevels, Levels::remeshTexel;
+    using Levels::remeshLevel, Levels::remeshLevels, Levels::remeshTexels;
     using typename Levels::RemeshLevel;
 
 #include "mesostructure/shared/remesh_heights.h"
@@ -68,8 +69,8 @@ struct RemeshSweeping : RemeshMath<T>, Piece {
     using Math::remeshBetween, Math::remeshColumn, Math::remeshDepth, Math::remeshEdge, Math::remeshNearestPart,
         Math::remeshPart, Math::remeshPlan, Math::kRemeshMap, Math::kRemeshMost;
     using Piece::remeshAddTriangle, Piece::remeshAddVertex, Piece::remeshCell, Piece::remeshCorner,
-        Piece::remeshFootprint, Piece::remeshHeight, Piece::remeshLevels, Piece::remeshMapWidth, Piece::remeshParts,
-        Piece::remeshSeam, Piece::view;
+        Piece::remeshFootprint, Piece::remeshFootprintOf, Piece::remeshHeight, Piece::remeshHeightLevel,
+        Piece::remeshLevels, Piece::remeshMapWidth, Piece::remeshParts, Piece::remeshSeam, Piece::view;
     using typename Math::RemeshColumn, typename Math::RemeshCorner, typename Math::RemeshPlan,
         typename Math::RemeshSeam;
     using typename Piece::RemeshFootprint;

@@ -18,6 +18,7 @@ struct RemeshPiece {
     int halvings = 0;
     uint32_t triangle = 0;  ///< of the base
     glm::ivec3 parts{0};    ///< of the edges from corner k to the next, at most their cells; 0: their cells
+    glm::ivec4 levels{0};   ///< of the heights, where access is to the map: along these edges, and within
 };
 
 }  // namespace vcp::meso

@@ -1,6 +1,5 @@
 #include "mesostructure/remesh/remesh_pieces.h"
 
-#include <array>
 #include <bit>
 
 #include "mesostructure/remesh/piece_maker.h"
@@ -29,6 +28,7 @@ void addPiece(std::vector<glm::uvec4>& quads, const RemeshPiece<float>& piece) {
     for (int k = 0; k < 3; ++k) parts |= uint32_t(piece.parts[k]) << (10 * k);
     quads.emplace_back(word(c[2].uv.x), word(c[2].uv.y), seams, parts);
     for (const auto& seam : piece.seams) quads.push_back(quad(seam.start, seam.end));
+    quads.emplace_back(piece.levels);
 }
 
 struct PieceSize {
@@ -100,23 +100,6 @@ Result<void> makeRemeshPieces(CertifiedCells& cells, const RemeshCamera& camera,
     VCP_TRY(addPieces(cells.patches(), camera, ofMap, &cells, pieces, limits, mostVertices));
     pieces.counts.boundPixels = counts.boundPixels, pieces.counts.uncertified = counts.uncertified;
     return {};
-}
-
-RemeshLevelBytes::RemeshLevelBytes(const HeightLevels& levels) {
-    constexpr size_t kQuad = 16;
-    static constexpr std::array<std::byte, kQuad> kFill{};
-    const auto quadsOf = [](size_t bytes) { return (bytes + kQuad - 1) / kQuad; };
-    size_t first = levels.levels().size();
-    for (const HeightLevel& level : levels.levels()) {
-        table_.insert(table_.end(), {uint32_t(first), uint32_t(level.size.x), uint32_t(level.size.y),
-                                     word(float(double(level.size.y) / levels.rows()))});
-        first += quadsOf(level.texels.size() * sizeof(uint16_t));
-    }
-    parts_.push_back(std::as_bytes(std::span(table_)));
-    for (const HeightLevel& level : levels.levels()) {
-        parts_.push_back(std::as_bytes(std::span(level.texels)));
-        parts_.push_back(std::span(kFill).first(kQuad * quadsOf(parts_.back().size()) - parts_.back().size()));
-    }
 }
 
 }  // namespace vcp::meso

@@ -3,7 +3,6 @@
 // nothing of each other.
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -51,19 +50,5 @@ Result<void> makeRemeshPieces(const RemeshSurface& surface, const RemeshCamera& 
 Result<void> makeRemeshPieces(CertifiedCells& cells, const RemeshCamera& camera, const RemeshOptions& options,
                               RemeshPieces& pieces, const RemeshBatchLimits& limits = {},
                               uint64_t mostVertices = uint64_t{1} << 26);
-
-/// The levels as devices read them (shared/remesh_layout.h), in whole quads. It refers to the levels.
-class RemeshLevelBytes {
-public:
-    explicit RemeshLevelBytes(const HeightLevels& levels);
-    RemeshLevelBytes(const RemeshLevelBytes&) = delete;
-    RemeshLevelBytes& operator=(const RemeshLevelBytes&) = delete;
-
-    [[nodiscard]] std::span<const std::span<const std::byte>> parts() const { return parts_; }  ///< one after the other
-
-private:
-    std::vector<uint32_t> table_;
-    std::vector<std::span<const std::byte>> parts_;
-};
 
 }  // namespace vcp::meso

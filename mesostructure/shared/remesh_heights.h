@@ -1,12 +1,14 @@
 // Heights of filter levels (mesostructure/remesh/height_levels.h) in C++ and GLSL. A level is read as RemeshLevel: its
 // `size` in texels, and its `texels` in a tile unit along x and y. Whoever includes this has
 //   RemeshLevel remeshLevel(int level)                             a level's size and where it is stored
-//   uint remeshTexel(CONST_REF(RemeshLevel) level, int i)          its i-th height, row by row, of 65535
+//   uvec4 remeshTexels(CONST_REF(RemeshLevel) level, ivec2 at)     its heights at a texel, of 65535, and after it along
+//                                                                  x, along y, and along both: from all sides, it
+//                                                                  repeats
 //   int remeshLevels()                                             how many there are
 
-// Returns the i-th height of a level: one product, rounded alike everywhere.
-INLINE Real remeshTexelHeight(CONST_REF(RemeshLevel) level, int i) {
-    PRECISE Real height = Real(remeshTexel(level, i)) * Real(1.5259021896696422e-5);
+// Returns the height of a texel: one product, rounded alike everywhere.
+INLINE Real remeshTexelHeight(uint texel) {
+    PRECISE Real height = Real(texel) * Real(1.5259021896696422e-5);
     return height;
 }
 
@@ -20,12 +22,9 @@ INLINE int remeshWrapped(Real x, int n) {
 INLINE Real remeshLevelHeight(CONST_REF(RemeshLevel) level, Real2 at) {
     PRECISE Real x = at.x * level.texels.x, y = at.y * level.texels.y;
     PRECISE Real left = floor(x), lower = floor(y), u = x - left, v = y - lower;
-    int i = remeshWrapped(left, level.size.x), j = remeshWrapped(lower, level.size.y);
-    int after = i + 1 < level.size.x ? i + 1 : 0, row = j * level.size.x,
-        above = (j + 1 < level.size.y ? j + 1 : 0) * level.size.x;
-    PRECISE Real low = remeshTexelHeight(level, row + i) * (Real(1) - u) + remeshTexelHeight(level, row + after) * u;
-    PRECISE Real high =
-        remeshTexelHeight(level, above + i) * (Real(1) - u) + remeshTexelHeight(level, above + after) * u;
+    uvec4 texels = remeshTexels(level, ivec2(remeshWrapped(left, level.size.x), remeshWrapped(lower, level.size.y)));
+    PRECISE Real low = remeshTexelHeight(texels.x) * (Real(1) - u) + remeshTexelHeight(texels.y) * u;
+    PRECISE Real high = remeshTexelHeight(texels.z) * (Real(1) - u) + remeshTexelHeight(texels.w) * u;
     PRECISE Real height = low * (Real(1) - v) + high * v;
     return height;
 }
@@ -51,6 +50,15 @@ struct RemeshFootprint {
     RemeshLevel fine, coarse;
     Real part;
 };
+
+// Of one level.
+INLINE RemeshFootprint remeshFootprintOf(int level) {
+    RemeshFootprint made;
+    made.fine = remeshLevel(level);
+    made.coarse = made.fine;
+    made.part = Real(0);
+    return made;
+}
 
 // `texels`: the footprint's edge, in texels.
 INLINE RemeshFootprint remeshFootprint(Real texels) {

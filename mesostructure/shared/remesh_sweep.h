@@ -4,6 +4,7 @@
 //   RemeshCorner remeshCorner(int k)          the piece's, and of each corner the cell alone, remeshCell(k)
 //   RemeshSeam remeshSeam(int k)              of the edge from corner k to the next
 //   int remeshParts(int k, int cells)         into how many parts that edge is split, at most its cells
+//   int remeshHeightLevel(int k)              of the map's heights along that edge; 3: within the piece
 //   remesh_heights.h, and remeshMapWidth(): texels of the map along x
 //   void remeshAddVertex(uint number, Real3 position, Real2 uv, Real height)
 //   void remeshAddTriangle(uint a, uint b, uint c)
@@ -31,9 +32,10 @@ INLINE Real remeshTexelsAt(Real3 position, Real density) {
     return texels;
 }
 
-// Returns what heights are taken from, for a footprint of so many texels.
-INLINE RemeshFootprint remeshHeightFootprint(Real texels) {
-    return remeshFootprint(view.access == kRemeshMap ? Real(0) : texels);
+// Returns what heights are taken from: for a footprint of so many texels, or the map's level.
+INLINE RemeshFootprint remeshHeightFootprint(Real texels, int level) {
+    if (view.access == kRemeshMap) return remeshFootprintOf(level);
+    return remeshFootprint(texels);
 }
 
 // Returns the height at a place, of a point of the base at `position`. The footprint is that of its texels.
@@ -316,6 +318,7 @@ INLINE void remeshAddPoints(CONST_REF(RemeshSweep) s, int column, uint insideFir
         Real2 beyond;
         uint number;
         bool hasSeam = false;
+        int side = 3;  // the edge that it is on; 3: none
         int ownCorner = j < corners ? j : -1;
         if (j >= beforeInside) {
             number = insideFirst + uint(j - beforeInside);
@@ -334,6 +337,7 @@ INLINE void remeshAddPoints(CONST_REF(RemeshSweep) s, int column, uint insideFir
             } else {
                 RemeshSeam seam = remeshSeam(k);
                 point = remeshEdgePoint(k, along, n);
+                side = k;
                 hasSeam = seam.is;
                 if (hasSeam) beyond = remeshBeyond(seam, k, along, n);
             }
@@ -350,7 +354,7 @@ INLINE void remeshAddPoints(CONST_REF(RemeshSweep) s, int column, uint insideFir
         }
         if (ownCorner < 0) {
             Real texels = remeshTexelsAt(point.position, point.density);
-            RemeshFootprint sampled = remeshHeightFootprint(texels);
+            RemeshFootprint sampled = remeshHeightFootprint(texels, remeshHeightLevel(side));
             point.height = remeshHeightAt(sampled, texels, point.uv, point.position, point.direction);
             // Where the map jumps, an edge's point has the higher of its two sides' heights.
             if (hasSeam)

@@ -10,7 +10,7 @@ namespace vcp {
 namespace {
 
 constexpr VkDescriptorType kMesoBindings[] = {kUniform, kTexels, kTexels,  kTexels,  kStorage, kStorage,
-                                              kStorage, kTexels, kStorage, kStorage, kTexels};
+                                              kStorage, kTexels, kStorage, kStorage, kTexels,  kStorage};
 constexpr uint32_t kMesoBindingCount = std::size(kMesoBindings);
 
 }  // namespace
@@ -55,16 +55,6 @@ Result<MesoTexels> MesoResources::words(std::span<const uint32_t> words) {
     made.buffer = std::move(buffer);
     VCP_TRY_ASSIGN(made.view, device_.createTexelView(made.buffer, VK_FORMAT_R32_UINT, words.size_bytes()));
     VCP_TRY_ASSIGN(made.quads, device_.createTexelView(made.buffer, VK_FORMAT_R32G32B32A32_UINT, words.size_bytes()));
-    return made;
-}
-
-Result<MesoTexels> MesoResources::quads(std::span<const std::span<const std::byte>> parts) {
-    uint64_t bytes = 0;
-    for (const auto part : parts) bytes += part.size();
-    VCP_TRY(checkTexels(bytes / 16, "heights"));
-    MesoTexels made;
-    VCP_TRY_ASSIGN(made.buffer, device_.createFilled(parts, VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT));
-    VCP_TRY_ASSIGN(made.quads, device_.createTexelView(made.buffer, VK_FORMAT_R32G32B32A32_UINT, bytes));
     return made;
 }
 
@@ -135,36 +125,39 @@ Result<MesoSet> allocateSet(VkDevice device, VkDescriptorSetLayout layout,
 }
 
 Result<MesoSet> MesoResources::makeSet(const Bound& bound) const {
-    const VkDescriptorPoolSize sizes[] = {{VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, 1}, {kTexels, 5}, {kStorage, 5}};
+    const VkDescriptorPoolSize sizes[] = {{VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, 1}, {kTexels, 5}, {kStorage, 6}};
     VCP_TRY_ASSIGN(auto owner, allocateSet(device_.handle(), setLayout_, sizes));
 
     const auto orInput = [&](const MesoTexels* texels) {
         return (texels != nullptr ? texels : bound.input)->view.handle();
     };
-    const VkBufferView words = bound.words->view.handle();
-    const VkBufferView views[kMesoBindingCount] = {VK_NULL_HANDLE,
-                                                   words != VK_NULL_HANDLE ? words : bound.input->view.handle(),
-                                                   bound.words->quads.handle(),
-                                                   bound.input->view.handle(),
-                                                   VK_NULL_HANDLE,
-                                                   VK_NULL_HANDLE,
-                                                   VK_NULL_HANDLE,
-                                                   orInput(bound.look),
-                                                   VK_NULL_HANDLE,
-                                                   VK_NULL_HANDLE,
-                                                   orInput(bound.baseLight)};
+    const VkBufferView views[kMesoBindingCount] = {
+        VK_NULL_HANDLE,
+        orInput(bound.words),
+        bound.words != nullptr ? bound.words->quads.handle() : bound.heights->view(),
+        bound.input->view.handle(),
+        VK_NULL_HANDLE,
+        VK_NULL_HANDLE,
+        VK_NULL_HANDLE,
+        orInput(bound.look),
+        VK_NULL_HANDLE,
+        VK_NULL_HANDLE,
+        orInput(bound.baseLight),
+        VK_NULL_HANDLE};
     const auto orUnused = [&](const Buffer* buffer) { return buffer != nullptr ? buffer : bound.counters; };
-    const Buffer* const buffers[kMesoBindingCount] = {bound.constants,
-                                                      nullptr,
-                                                      nullptr,
-                                                      nullptr,
-                                                      bound.hits,
-                                                      bound.picture,
-                                                      bound.counters,
-                                                      nullptr,
-                                                      orUnused(bound.sceneLight),
-                                                      orUnused(bound.depths),
-                                                      nullptr};
+    const Buffer* const buffers[kMesoBindingCount] = {
+        bound.constants,
+        nullptr,
+        nullptr,
+        nullptr,
+        bound.hits,
+        bound.picture,
+        bound.counters,
+        nullptr,
+        orUnused(bound.sceneLight),
+        orUnused(bound.depths),
+        nullptr,
+        orUnused(bound.heights != nullptr ? &bound.heights->marks() : nullptr)};
     VkDescriptorBufferInfo infos[kMesoBindingCount] = {};
     VkWriteDescriptorSet writes[kMesoBindingCount];
     for (uint32_t i = 0; i < kMesoBindingCount; ++i) {

@@ -16,6 +16,8 @@
 //           of the whole picture          surface
 // 10        light over the base; or the   copies, CPU (upload)    surface, merge
 //           frames of base triangles
+// 11        tiles of heights that were    merge                   readback
+//           read
 //
 // Push constants: the ray of light that is cast, MesoLightRay.
 #pragma once
@@ -27,6 +29,7 @@
 #include <vector>
 
 #include "mesostructure/march_arrays.h"
+#include "render/height_pool.h"
 #include "render/shared/meso_view.h"
 #include "render/vulkan/compute_pipeline.h"
 #include "render/vulkan/device.h"
@@ -81,8 +84,6 @@ public:
 
     /// Makes texels of words. Errors: Device (no memory); Limit (more texels than the device reads).
     Result<MesoTexels> words(std::span<const uint32_t> words);
-    /// Makes texels of four words of parts that follow each other, 16 bytes each; `quads` alone.
-    Result<MesoTexels> quads(std::span<const std::span<const std::byte>> parts);
     Result<MesoTexels> vectors(std::span<const glm::vec4> vectors);
     Result<MesoTexels> halfs(std::span<const uint64_t> halfs);  ///< four to a texel
     Result<MesoTexels> emptyHalfs(uint64_t texels);             ///< to be filled by copies
@@ -90,11 +91,13 @@ public:
 
     struct Bound {
         const Buffer* constants;
-        const MesoTexels *words, *input;  ///< without a view of words the shaders read fours alone
+        const MesoTexels* words;  ///< null: there are heights
+        const MesoTexels* input;
         const Buffer *hits, *picture, *counters;
         const MesoTexels* look = nullptr;                       ///< null: the shaders read none
         const Buffer *sceneLight = nullptr, *depths = nullptr;  ///< null: surfaces and datasets do not shade each other
         const MesoTexels* baseLight = nullptr;                  ///< null: the shaders read none
+        const HeightPool* heights = nullptr;                    ///< in place of words
     };
     /// Makes a descriptor set. Errors: Device.
     Result<MesoSet> makeSet(const Bound& bound) const;

@@ -26,18 +26,38 @@ constexpr uint32_t kPictureRays = 0, kRaysToLights = 1, kRayToLight = 2, kRayInt
 
 VkBuffer handleOf(const Buffer* buffer) { return buffer != nullptr ? buffer->handle() : VK_NULL_HANDLE; }
 
+/// Returns what all tiles of the surfaces' heights take.
+uint64_t bytesOfHeights(std::span<const MesoSurface> surfaces) {
+    std::map<const meso::HeightLevels*, uint64_t> bytes;
+    for (const MesoSurface& surface : surfaces)
+        if (surface.remeshed.surface) {
+            const meso::HeightLevels& heights = *surface.remeshed.surface->heights;
+            bytes[&heights] = HeightPool::bytesOfAll(heights);
+        }
+    uint64_t sum = 0;
+    for (const auto& [heights, count] : bytes) sum += count;
+    return sum;
+}
+
 RemeshLook remeshLook(const FrameRequest& request) {
     return {request.camera, wholePicture(request), upperLeft(request), sizeOf(request)};
 }
 
 }  // namespace
 
-Result<void> MesoSurfacePass::setSurfaces(std::span<const MesoSurface> surfaces) {
-    surfaces_.clear(), raster_.forget();
+Result<HeightPool*> MesoSurfacePass::heightsFor(const RemeshedSurface& surface, uint64_t mostBytes) {
+    for (const auto& known : heights_)
+        if (&known->heights() == surface.surface->heights.get()) return known.get();
+    VCP_TRY_ASSIGN(auto made, HeightPool::create(device_, surface.surface->heights, mostBytes));
+    return heights_.emplace_back(std::move(made)).get();
+}
+
+Result<void> MesoSurfacePass::setSurfaces(std::span<const MesoSurface> surfaces, uint64_t heightBytes) {
+    surfaces_.clear(), heights_.clear(), raster_.forget();
     remeshed_ = 0;
     ++version_;
     std::map<const meso::MarchArrays*, std::shared_ptr<MesoTexels>> uploaded;
-    std::map<const meso::HeightLevels*, std::shared_ptr<MesoTexels>> levels;
+    const double share = double(heightBytes) / double(std::max<uint64_t>(bytesOfHeights(surfaces), 1));
     std::map<LookKey, std::shared_ptr<MesoTexels>> looks;
     std::vector<Placed> placed;
     for (const MesoSurface& surface : surfaces) {
@@ -46,13 +66,8 @@ Result<void> MesoSurfacePass::setSurfaces(std::span<const MesoSurface> surfaces)
         made.origin = surface.arrays ? surface.shell.origin : made.remeshed.surface->origin;
         if (made.remeshed.surface) {
             made.number = remeshed_++;
-            const meso::HeightLevels& heights = *made.remeshed.surface->heights;
-            auto& kept = levels[&heights];
-            if (!kept) {
-                VCP_TRY_ASSIGN(auto texels, resources_.quads(meso::RemeshLevelBytes(heights).parts()));
-                kept = std::make_shared<MesoTexels>(std::move(texels));
-            }
-            made.levels = kept;
+            const uint64_t all = HeightPool::bytesOfAll(*made.remeshed.surface->heights);
+            VCP_TRY_ASSIGN(made.heights, heightsFor(made.remeshed, share < 1 ? uint64_t(share * double(all)) : all));
             // A pixel has the number in single precision.
             if (made.remeshed.surface->triangles.size() >= (size_t{1} << 24))
                 return Error{.code = ErrorCode::Limit, .message = "a remeshed base has less than 2^24 triangles"};
@@ -91,13 +106,13 @@ uint64_t MesoSurfacePass::assetBytes() const {
     std::map<const MesoTexels*, uint64_t> bytes;
     uint64_t sum = 0;
     for (const Placed& surface : surfaces_) {
-        if (surface.remeshed.surface)
-            bytes[surface.levels.get()] = surface.levels->buffer.bytes(), sum += surface.frames.buffer.bytes();
+        if (surface.remeshed.surface) sum += surface.frames.buffer.bytes();
         if (surface.arrays)
             bytes[surface.words.get()] = surface.words->buffer.bytes(), sum += surface.shell.buffer.bytes();
         if (surface.look) bytes[surface.look.get()] = surface.look->buffer.bytes();
     }
     for (const auto& [texels, count] : bytes) sum += count;
+    for (const auto& heights : heights_) sum += heights->bytes();
     return sum;
 }
 
@@ -112,6 +127,11 @@ Result<void> MesoSurfacePass::makeTarget(MesoTarget& target, PictureSize size, u
     VCP_TRY_ASSIGN(target.reported,
                    device_.createBuffer(sizeof(MesoReport), VK_BUFFER_USAGE_TRANSFER_DST_BIT, MemoryUse::Readback));
     if (remeshed_ > 0) VCP_TRY(raster_.prepare(target.remeshed, size, remeshed_));
+    for (const auto& heights : heights_) {
+        VCP_TRY_ASSIGN(
+            target.marks.emplace_back().words,
+            device_.createBuffer(heights->marks().bytes(), VK_BUFFER_USAGE_TRANSFER_DST_BIT, MemoryUse::Readback));
+    }
     for (const Placed& surface : surfaces_) {
         const bool isRemeshed = surface.remeshed.surface != nullptr;
         MesoTarget::Drawing drawing;
@@ -124,14 +144,14 @@ Result<void> MesoSurfacePass::makeTarget(MesoTarget& target, PictureSize size, u
             VCP_TRY_ASSIGN(light.filled, device_.createBuffer(light.texels.buffer.bytes(),
                                                               VK_BUFFER_USAGE_TRANSFER_SRC_BIT, MemoryUse::Upload));
         }
-        VCP_TRY_ASSIGN(
-            drawing.set,
-            resources_.makeSet({&drawing.constants, isRemeshed ? surface.levels.get() : surface.words.get(),
-                                isRemeshed ? &target.remeshed.hits : &surface.shell, &target.hits, picture.colours,
-                                &target.counters, surface.look.get(), picture.sceneLight, picture.depths,
-                                isRemeshed ? &surface.frames
-                                : hasLight ? &light.texels
-                                           : nullptr}));
+        VCP_TRY_ASSIGN(drawing.set, resources_.makeSet({&drawing.constants, isRemeshed ? nullptr : surface.words.get(),
+                                                        isRemeshed ? &target.remeshed.hits : &surface.shell,
+                                                        &target.hits, picture.colours, &target.counters,
+                                                        surface.look.get(), picture.sceneLight, picture.depths,
+                                                        isRemeshed ? &surface.frames
+                                                        : hasLight ? &light.texels
+                                                                   : nullptr,
+                                                        surface.heights}));
         if (isRemeshed && surface.arrays) {
             VCP_TRY_ASSIGN(drawing.lightSet,
                            resources_.makeSet({&drawing.constants, surface.words.get(), &surface.shell, &target.hits,
@@ -195,7 +215,7 @@ Result<void> MesoSurfacePass::prepare(MesoTarget& target, const Picture& picture
         VCP_TRY(choosePipelines(surface, target.drawings[i], request.shading, inScene));
         fillBaseLight(surface, target.drawings[i].baseLight, request.shading);
         if (surface.remeshed.surface)
-            VCP_TRY(raster_.remesh(target.remeshed, surface.number, surface.remeshed, *surface.levels,
+            VCP_TRY(raster_.remesh(target.remeshed, surface.number, surface.remeshed, *surface.heights,
                                    remeshLook(request)));
     }
     std::vector<uint32_t> shade{0, 0, 0, 0, 0, 0, 0, inScene ? 1u : 0u};
@@ -270,6 +290,8 @@ void MesoSurfacePass::recordHits(VkCommandBuffer commands, MesoTarget& target, c
         const VkBufferCopy all{0, 0, light.filled.bytes()};
         vkCmdCopyBuffer(commands, light.filled.handle(), light.texels.buffer.handle(), 1, &all);
     }
+    for (size_t i = 0; i < heights_.size(); ++i)
+        target.marks[i].picture = heights_[i]->begin(commands), target.marks[i].version = heights_[i]->version();
     barrierToAll(commands);
     for (size_t i = 0; i < surfaces_.size(); ++i) {
         if (surfaces_[i].remeshed.surface)
@@ -277,6 +299,29 @@ void MesoSurfacePass::recordHits(VkCommandBuffer commands, MesoTarget& target, c
         push(commands, {});
         dispatch(commands, target.drawings[i].cast, target, i);
     }
+    if (heights_.empty()) return;
+    barrierComputeToReadback(commands);
+    for (size_t i = 0; i < heights_.size(); ++i) {
+        const VkBufferCopy all{0, 0, heights_[i]->marks().bytes()};
+        vkCmdCopyBuffer(commands, heights_[i]->marks().handle(), target.marks[i].words.handle(), 1, &all);
+    }
+    barrierToAll(commands);
+}
+
+uint32_t MesoSurfacePass::look(ViewNumber view, const MesoTarget& target) {
+    uint32_t missing = 0;
+    for (size_t i = 0; i < heights_.size(); ++i) {
+        const MesoTarget::Marks& marks = target.marks[i];
+        const std::span words(reinterpret_cast<const uint32_t*>(marks.words.mapped()), marks.words.bytes() / 4);
+        missing += heights_[i]->look(view, words, marks.picture, marks.version);
+    }
+    return missing;
+}
+
+uint64_t MesoSurfacePass::heightBytes() const {
+    uint64_t sum = 0;
+    for (const auto& heights : heights_) sum += heights->residentBytes();
+    return sum;
 }
 
 void MesoSurfacePass::recordRay(VkCommandBuffer commands, const MesoTarget& target, const frame::MesoLightRay& ray) {

@@ -62,6 +62,13 @@ struct MesoTarget {
     VkBuffer sceneLight = VK_NULL_HANDLE;  ///< the same; null where surfaces and datasets do not shade each other
     VkBuffer depths = VK_NULL_HANDLE;      ///< the same
     RemeshTarget remeshed;
+    /// What a frame wrote into the marks of a map (HeightPool).
+    struct Marks {
+        Buffer words;
+        uint32_t picture = 0;
+        uint64_t version = 0;
+    };
+    std::vector<Marks> marks;       ///< one for each map
     std::vector<Drawing> drawings;  ///< one for each surface
     VkPipeline shade = VK_NULL_HANDLE;
 
@@ -74,9 +81,9 @@ public:
     MesoSurfacePass(Device& device, MesoResources& resources)
         : device_(device), resources_(resources), raster_(device) {}
 
-    /// Replaces the surfaces; waits for nothing: no frame may be in flight. On an error there are none. Errors: Device,
-    /// Limit.
-    Result<void> setSurfaces(std::span<const MesoSurface> surfaces);
+    /// Replaces the surfaces; waits for nothing: no frame may be in flight. Heights take at most `heightBytes`. On an
+    /// error there are none. Errors: Device, Limit.
+    Result<void> setSurfaces(std::span<const MesoSurface> surfaces, uint64_t heightBytes);
     /// What the surfaces are drawn over.
     struct Picture {
         const Buffer* colours;     ///< what is seen without mesostructure, when the surfaces are shaded
@@ -95,6 +102,14 @@ public:
     void recordShade(VkCommandBuffer commands, const MesoTarget& target, const FrameRequest& request,
                      const std::optional<PicturePixel>& cursor);
 
+    /// The maps of what is remeshed.
+    [[nodiscard]] std::span<const std::unique_ptr<HeightPool>> heights() const { return heights_; }
+    /// Takes in which tiles of heights a view's frame read, and returns how many of them were not there. Precondition:
+    /// the frame is done.
+    uint32_t look(ViewNumber view, const MesoTarget& target);
+    /// Bytes of the tiles of heights that are there.
+    [[nodiscard]] uint64_t heightBytes() const;
+
     [[nodiscard]] uint64_t version() const { return version_; }
     /// Bytes of assets, shells and textures.
     [[nodiscard]] uint64_t assetBytes() const;
@@ -106,9 +121,9 @@ private:
         std::shared_ptr<const meso::BaseTransfer> baseTransfer;  ///< null where it changes nothing
         MesoTexels shell;
         RemeshedSurface remeshed;
-        std::shared_ptr<MesoTexels> levels;  ///< of the heights of what is remeshed
-        MesoTexels frames;                   ///< of its base triangles
-        size_t number = 0;                   ///< among those that are remeshed
+        HeightPool* heights = nullptr;  ///< of what is remeshed
+        MesoTexels frames;              ///< of its base triangles
+        size_t number = 0;              ///< among those that are remeshed
         glm::dvec3 origin;
         frame::MesoView view{};  ///< what does not depend on the picture
         uint32_t textures = 0;
@@ -118,6 +133,8 @@ private:
     [[nodiscard]] bool keepsTransfer(const Shading& shading) const;
     /// Returns the first plane of what rays of light start at; 0 where there is none.
     [[nodiscard]] uint32_t startPlanes(const Shading& shading, bool inScene) const;
+    /// Returns the heights of a surface, made for the first that has them.
+    Result<HeightPool*> heightsFor(const RemeshedSurface& surface, uint64_t mostBytes);
     static void fillBaseLight(const Placed& surface, MesoTarget::Drawing::BaseLight& light, const Shading& shading);
     Result<void> makeTarget(MesoTarget& target, PictureSize size, uint32_t planes, bool keepsTransfer,
                             const Picture& picture);
@@ -134,6 +151,7 @@ private:
     MesoResources& resources_;
     RemeshRaster raster_;
     std::vector<Placed> surfaces_;
+    std::vector<std::unique_ptr<HeightPool>> heights_;
     size_t remeshed_ = 0;  ///< number of those that are
     uint64_t version_ = 0;
 };

@@ -83,7 +83,7 @@ Result<void> RemeshRaster::prepare(RemeshTarget& target, PictureSize size, size_
 }
 
 Result<void> RemeshRaster::remesh(RemeshTarget& target, size_t number, const RemeshedSurface& surface,
-                                  const MesoTexels& levels, const RemeshLook& look) {
+                                  const HeightPool& heights, const RemeshLook& look) {
     RemeshDrawing& drawing = target.drawings[number];
     const meso::RemeshCamera camera = cameraOf(*surface.surface, look);
     if (surface.options.errorPixels > 0) {
@@ -99,7 +99,7 @@ Result<void> RemeshRaster::remesh(RemeshTarget& target, size_t number, const Rem
     drawing.view = target.pieces.view;
     target.certifiedPixels = std::max(target.certifiedPixels, target.pieces.counts.boundPixels);
     target.uncertified += target.pieces.counts.uncertified;
-    return sweep_.prepare(drawing.batches, target.pieces, levels);
+    return sweep_.prepare(drawing.batches, target.pieces, heights);
 }
 
 void RemeshRaster::record(VkCommandBuffer commands, const RemeshTarget& target, size_t number,

@@ -61,10 +61,10 @@ public:
     Result<void> prepare(RemeshTarget& target, PictureSize size, size_t surfaces);
     /// Forgets what is known of surfaces, which are no more.
     void forget() { cells_.clear(); }
-    /// Makes and uploads the pieces of a surface for a view. `levels`: meso::RemeshLevelBytes of its heights.
+    /// Makes and uploads the pieces of a surface for a view. `heights`: the surface's.
     /// Precondition: no frame in flight uses the target. Errors: Device; those of meso::makeRemeshPieces and
     /// of meso::CertifiedCells::create.
-    Result<void> remesh(RemeshTarget& target, size_t number, const RemeshedSurface& surface, const MesoTexels& levels,
+    Result<void> remesh(RemeshTarget& target, size_t number, const RemeshedSurface& surface, const HeightPool& heights,
                         const RemeshLook& look);
     /// Sweeps a surface's pieces, draws them into the images and copies these.
     void record(VkCommandBuffer commands, const RemeshTarget& target, size_t number, const RemeshedSurface& surface,

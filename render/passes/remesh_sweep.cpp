@@ -16,9 +16,9 @@ namespace {
 
 using Math = meso::RemeshMath<float>;
 
-constexpr VkDescriptorType kBindings[] = {kTexels, kTexels, kTexels, kStorage, kStorage, kStorage, kStorage};
+constexpr VkDescriptorType kBindings[] = {kTexels, kTexels, kTexels, kStorage, kStorage, kStorage, kStorage, kStorage};
 constexpr uint32_t kBindingCount = std::size(kBindings);
-constexpr VkDescriptorPoolSize kPoolSizes[] = {{kTexels, 3}, {kStorage, 4}};
+constexpr VkDescriptorPoolSize kPoolSizes[] = {{kTexels, 3}, {kStorage, 5}};
 // Columns of a workgroup of the counting and of the writing shader.
 constexpr uint32_t kCounted = 256, kEmitted = 64;
 constexpr uint64_t kVertexBytes = sizeof(meso::RemeshVertex<float>);
@@ -88,10 +88,10 @@ Result<void> RemeshSweepPass::upload(RemeshSwept& swept, const meso::RemeshBatch
                 std::as_bytes(std::span(batch.firstColumns)));
 }
 
-void RemeshSweepPass::writeSet(const RemeshSwept& swept, const MesoTexels& levels) const {
-    const VkBufferView views[] = {levels.quads.handle(), swept.quadsView.handle(), swept.firstColumnsView.handle()};
+void RemeshSweepPass::writeSet(const RemeshSwept& swept, const HeightPool& heights) const {
+    const VkBufferView views[] = {heights.view(), swept.quadsView.handle(), swept.firstColumnsView.handle()};
     const VkBuffer buffers[] = {swept.counts.handle(), swept.drawn.handle(), swept.vertices.handle(),
-                                swept.indices.handle()};
+                                swept.indices.handle(), heights.marks().handle()};
     VkDescriptorBufferInfo infos[kBindingCount] = {};
     VkWriteDescriptorSet writes[kBindingCount];
     for (uint32_t i = 0; i < kBindingCount; ++i) {
@@ -119,7 +119,7 @@ meso::RemeshBatchLimits RemeshSweepPass::limits() const {
 }
 
 Result<void> RemeshSweepPass::prepare(std::vector<RemeshSwept>& swept, const meso::RemeshPieces& pieces,
-                                      const MesoTexels& levels) {
+                                      const HeightPool& heights) {
     VCP_TRY(createPipelines());
     for (RemeshSwept& batch : swept) batch.pieces = batch.columns = 0;
     if (swept.size() < pieces.used) swept.resize(pieces.used);
@@ -138,7 +138,7 @@ Result<void> RemeshSweepPass::prepare(std::vector<RemeshSwept>& swept, const mes
         if (made.set.set == VK_NULL_HANDLE) {
             VCP_TRY_ASSIGN(made.set, allocateSet(device_.handle(), setLayout_, kPoolSizes));
         }
-        writeSet(made, levels);
+        writeSet(made, heights);
         made.pieces = batch.pieces(), made.columns = batch.columns();
     }
     return {};
@@ -146,7 +146,7 @@ Result<void> RemeshSweepPass::prepare(std::vector<RemeshSwept>& swept, const mes
 
 void RemeshSweepPass::record(VkCommandBuffer commands, const std::vector<RemeshSwept>& swept,
                              const meso::HeightLevels& heights, const Math::RemeshView& view) const {
-    const uint32_t levels = uint32_t(heights.levels().size()), width = uint32_t(heights.levels().front().size.x);
+    const uint32_t levels = uint32_t(heights.used()), width = uint32_t(heights.levels().front().size.x);
     const auto dispatch = [&](const ComputePipeline& pipeline, const RemeshSwept& batch, uint32_t groupCount) {
         const PushedSweep pushed{view,
                                  levels,

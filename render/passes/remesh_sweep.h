@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "mesostructure/remesh/remesh_pieces.h"
+#include "render/height_pool.h"
 #include "render/passes/meso_resources.h"
 #include "render/vulkan/compute_pipeline.h"
 #include "render/vulkan/device.h"
@@ -36,9 +37,8 @@ public:
     /// Returns what a batch may have on this device.
     [[nodiscard]] meso::RemeshBatchLimits limits() const;
     /// Uploads the pieces, and makes room for what they become; batches that are no longer used keep theirs.
-    /// `levels`: RemeshLevelBytes. Precondition: no frame in flight uses the batches; they are
-    /// within limits(). Errors: Device.
-    Result<void> prepare(std::vector<RemeshSwept>& swept, const meso::RemeshPieces& pieces, const MesoTexels& levels);
+    /// Precondition: no frame in flight uses the batches; they are within limits(). Errors: Device.
+    Result<void> prepare(std::vector<RemeshSwept>& swept, const meso::RemeshPieces& pieces, const HeightPool& heights);
     /// Records the sweep. Precondition: prepare() with the same pieces.
     void record(VkCommandBuffer commands, const std::vector<RemeshSwept>& swept, const meso::HeightLevels& heights,
                 const meso::RemeshMath<float>::RemeshView& view) const;
@@ -47,7 +47,7 @@ private:
     Result<void> createPipelines();
     Result<bool> grow(Buffer& buffer, uint64_t bytes, VkBufferUsageFlags usage, MemoryUse use) const;
     Result<void> upload(RemeshSwept& swept, const meso::RemeshBatch& batch) const;
-    void writeSet(const RemeshSwept& swept, const MesoTexels& levels) const;
+    void writeSet(const RemeshSwept& swept, const HeightPool& heights) const;
 
     Device& device_;
     VkDescriptorSetLayout setLayout_ = VK_NULL_HANDLE;

@@ -36,6 +36,9 @@ layout(set = 0, binding = 7) uniform textureBuffer lookTexels;  // what is seen 
 layout(set = 0, binding = 8, std430) buffer SceneLightBlock { uint sceneLight[]; };
 layout(set = 0, binding = 9, std430) buffer TargetDepthBlock { uint targetDepths[]; };
 layout(set = 0, binding = 10) uniform textureBuffer baseLightTexels;
+// The number of the picture; at entries of tiles of heights (remesh_levels.glsl), that of the last picture to read
+// them.
+layout(set = 0, binding = 11, std430) buffer HeightMarkBlock { uint heightMarks[]; };
 layout(push_constant) uniform RayBlock { MesoLightRay ray; };
 
 uint fetchWord(uint i) { return texelFetch(wordTexels, int(i)).x; }

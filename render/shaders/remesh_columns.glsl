@@ -14,6 +14,7 @@ layout(set = 0, binding = 3, std430) buffer CountBlock { uvec2 counts[]; };
 layout(set = 0, binding = 4, std430) buffer DrawBlock { uint drawn[]; };  // VkDrawIndexedIndirectCommand, and vertices
 layout(set = 0, binding = 5, std430) buffer VertexBlock { uvec2 vertices[]; };
 layout(set = 0, binding = 6, std430) buffer IndexBlock { uint indices[]; };
+layout(set = 0, binding = 7, std430) buffer HeightMarkBlock { uint heightMarks[]; };  // as in meso_bindings.glsl
 
 const uint kCounted = 256u;  // columns of a workgroup of remesh_count.comp
 
@@ -35,6 +36,8 @@ void remeshAddTriangle(uint a, uint b, uint c) {
     indices[nextIndex + 2u] = c;
     nextIndex += 3u;
 }
+
+void markHeightTile(int entry) { heightMarks[entry] = heightMarks[0]; }
 
 #include "render/shaders/remesh_piece.glsl"
 

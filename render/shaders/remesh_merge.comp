@@ -19,20 +19,10 @@ uint fetchHit(uint i) { return hits[i]; }
 #define CONSTANT const
 #define PRECISE
 #include "mesostructure/shared/remesh_layout.h"
-struct RemeshLevel {
-    ivec2 size;
-    vec2 texels;
-    uint first;
-};
 int remeshLevels() { return int(fetchBaseLight(0).x); }
-RemeshLevel remeshLevel(int number) {
-    uvec4 stored = fetchQuad(uint(number));
-    return RemeshLevel(ivec2(stored.yz), vec2(float(stored.y), uintBitsToFloat(stored.w)), stored.x);
-}
-uint remeshTexel(RemeshLevel level, int i) {
-    uint word = fetchQuad(level.first + uint(i >> 3))[i >> 1 & 3];
-    return word >> uint((i & 1) << 4) & 0xffffu;
-}
+uvec4 fetchHeightQuad(int i) { return fetchQuad(uint(i)); }
+void markHeightTile(int entry) { heightMarks[entry] = heightMarks[0]; }
+#include "render/shaders/remesh_levels.glsl"
 #include "mesostructure/shared/remesh_heights.h"
 #include "mesostructure/shared/remesh_normal.h"
 

@@ -12,6 +12,8 @@ layout(push_constant) uniform PatchBlock {
 void remeshAddVertex(uint number, vec3 position, vec2 uv, float height) {}
 void remeshAddTriangle(uint a, uint b, uint c) {}
 
+void markHeightTile(int entry) {}  // all are there
+
 #include "render/shaders/remesh_piece.glsl"
 
 int cellsOfEdge(int k) { return remeshEdge(remeshCell(k), remeshCell((k + 1) % 3)).cells; }

@@ -1,6 +1,6 @@
 // A piece of a remeshed surface, by the shared maths: what the sweep (remesh_columns.glsl) and patches
 // (remesh_patch.glsl) have in common. Whoever includes this has pushed `view`, `levels` and `mapWidth`, and has
-// remeshAddVertex and remeshAddTriangle (mesostructure/shared/remesh_sweep.h).
+// remeshAddVertex and remeshAddTriangle (mesostructure/shared/remesh_sweep.h) and markHeightTile (remesh_levels.glsl).
 layout(set = 0, binding = 0) uniform utextureBuffer levelQuads;
 layout(set = 0, binding = 1) uniform utextureBuffer pieceQuads;
 
@@ -39,29 +39,14 @@ int remeshParts(int k, int cells) {
     return parts > 0 ? parts : cells;
 }
 
+int remeshHeightLevel(int k) { return int(pieceQuad(14)[k]); }
+
 // The number of the base triangle.
 uint pieceTriangle() { return pieceQuad(10).z >> 3; }
 
-struct RemeshLevel {
-    ivec2 size;
-    vec2 texels;
-    int first;
-};
-
 int remeshLevels() { return int(levels); }
 float remeshMapWidth() { return float(mapWidth); }
-RemeshLevel remeshLevel(int number) {
-    uvec4 stored = texelFetch(levelQuads, number);
-    RemeshLevel level;
-    level.first = int(stored.x);
-    level.size = ivec2(stored.yz);
-    level.texels = vec2(float(level.size.x), uintBitsToFloat(stored.w));
-    return level;
-}
-uint remeshTexel(RemeshLevel level, int i) {
-    uint word = texelFetch(levelQuads, level.first + (i >> 3))[i >> 1 & 3];
-    return word >> uint((i & 1) << 4) & 0xffffu;
-}
-
+uvec4 fetchHeightQuad(int i) { return texelFetch(levelQuads, i); }
+#include "render/shaders/remesh_levels.glsl"
 #include "mesostructure/shared/remesh_heights.h"
 #include "mesostructure/shared/remesh_sweep.h"

@@ -83,21 +83,20 @@ Result<void> Renderer::setBudgets(uint64_t budgetBytes, uint64_t ramBytes) {
 
 namespace {
 
-/// What heights take on the device, and what rays of light march, is known before it is copied there.
-Result<void> checkHeights(std::span<const MesoSurface> surfaces, uint64_t budgetBytes) {
+/// What rays of light march is known before it is copied to the device.
+Result<void> checkArrays(std::span<const MesoSurface> surfaces, uint64_t budgetBytes) {
     std::set<const void*> all;
     uint64_t bytes = 0;
     for (const MesoSurface& surface : surfaces) {
         if (!surface.remeshed.surface) continue;
-        const meso::HeightLevels& heights = *surface.remeshed.surface->heights;
-        if (all.insert(&heights).second) bytes += heights.bytes();
         if (surface.arrays && all.insert(surface.arrays.get()).second)
             bytes += surface.arrays->words.size() * sizeof(uint32_t);
     }
     if (bytes <= budgetBytes) return {};
     return Error{
         .code = ErrorCode::Limit,
-        .message = fmt::format("the heights of remeshed surfaces take {} bytes, and the budget is {}: allow more",
+        .message = fmt::format("what shadows on remeshed surfaces need takes {} bytes, and the budget is {}: allow "
+                               "more, or ask for none",
                                bytes, budgetBytes)};
 }
 
@@ -106,7 +105,7 @@ Result<void> checkHeights(std::span<const MesoSurface> surfaces, uint64_t budget
 Result<void> Renderer::setSurfaces(std::span<const MesoSurface> surfaces) {
     Shared& s = *view_->shared;
     if (!s.device) return kGone;
-    VCP_TRY(checkHeights(surfaces, s.options.budgetBytes));
+    VCP_TRY(checkArrays(surfaces, s.options.budgetBytes));
     VCP_TRY(s.device->waitForAll());
     const uint64_t before = s.surfaceBytes();
     for (View* view : s.views) view->forgetFrames();
@@ -159,6 +158,12 @@ Result<UpdateResult> Renderer::update(const FrameRequest& request) {
     return result;
 }
 
-void Renderer::waitForPage(std::chrono::milliseconds timeout) { vcp::waitForPage(view_->shared->datasets, timeout); }
+void Renderer::waitForPage(std::chrono::milliseconds timeout) {
+    const Shared& s = *view_->shared;
+    if (s.meso && s.meso->pass)
+        for (const auto& heights : s.meso->pass->heights())
+            if (heights->isReading()) return heights->wait(timeout);
+    vcp::waitForPage(s.datasets, timeout);
+}
 
 }  // namespace vcp

@@ -249,7 +249,7 @@ Result<void> Renderer::View::recordSurfaces(VkCommandBuffer commands, Frame& fra
     meso.pass->recordShade(commands, frame.surfaces, frame.request, frame.cursor);
     if (!frame.isLit) frame.surfacesTimer.mark(commands, 1);
     frame.stats.pipelines += meso.resources->pipelinesMade();
-    frame.stats.surfaceBytes = meso.pass->assetBytes();
+    frame.stats.surfaceBytes = meso.pass->assetBytes(), frame.stats.heightBytes = meso.pass->heightBytes();
     frame.stats.remeshedPixels = frame.surfaces.remeshed.certifiedPixels;
     frame.stats.uncertifiedPatches = frame.surfaces.remeshed.uncertified;
     return {};
@@ -591,6 +591,9 @@ Result<void> Renderer::View::takeIn(Frame& frame) {
     if (shared->meso) {
         surfaces = frame.surfaces.report();
         VCP_TRY(addSurfaceStats(frame, stats));
+        stats.missingHeights = shared->meso->pass->look(number, frame.surfaces);
+        if (stats.missingHeights > 0) stats.remeshedPixels = 0;
+        heightsRead = frame.request;
     }
     const double passes =
         stats.msBeam + stats.msTrace + stats.msLight + stats.msShade + stats.msFeedback + stats.msSurfaces;

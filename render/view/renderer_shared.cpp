@@ -33,11 +33,13 @@ Result<void> Renderer::Shared::uploadSurfaces() {
         meso->prepared = *std::move(prepared);
     else
         meso->prepared.clear();
+    // Heights come tile by tile: they leave half of what there is to pages.
+    const uint64_t heightBytes = options.budgetBytes / 2;
     const auto upload = [&]() -> Result<void> {
-        if (meso->pass) return meso->pass->setSurfaces(meso->surfaces);
+        if (meso->pass) return meso->pass->setSurfaces(meso->surfaces, heightBytes);
         VCP_TRY_ASSIGN(meso->resources, MesoResources::create(*device));
         meso->pass = std::make_unique<MesoSurfacePass>(*device, *meso->resources);
-        return meso->pass->setSurfaces(meso->surfaces);
+        return meso->pass->setSurfaces(meso->surfaces, heightBytes);
     };
     const auto done = upload();
     if (!done) meso.reset();

@@ -18,6 +18,8 @@ Renderer::View::~View() {
     if (shared->device) static_cast<void>(shared->device->waitForAll());
     std::erase(shared->views, this);
     if (SceneResidency* const scene = sceneOf(shared->datasets)) scene->forgetView(number);
+    if (shared->meso && shared->meso->pass)
+        for (const auto& heights : shared->meso->pass->heights()) heights->forgetView(number);
 }
 
 Result<VkSurfaceKHR> Renderer::View::createSurface() const {
@@ -152,6 +154,7 @@ void Renderer::View::forgetFrames() {
     abandonFrame();
     drawn.reset();
     lastDone.reset();
+    heightsRead.reset();
     for (Frame& frame : frames) {
         frame.submission = 0;
         frame.surfaces = {};
@@ -172,6 +175,24 @@ void Renderer::View::release() {
     sums = {};
 }
 
+Result<void> Renderer::View::updateHeights(const FrameRequest& request, UpdateResult& all) {
+    bool isKnown = true;
+    uint32_t toCome = 0;
+    for (const auto& heights : shared->meso->pass->heights()) {
+        VCP_TRY_ASSIGN(const bool came, heights->update());
+        all.changed = all.changed || came;
+        if (heights->hasAll()) continue;
+        const HeightPool::State state = heights->state(number);
+        isKnown = isKnown && state.isOfNow && heightsRead == request;
+        toCome += state.missing.toCome;
+        all.relaxed = all.relaxed || state.missing.withoutRoom > 0;
+    }
+    // What the next frame reads may be missing, too.
+    if (!isKnown) all.awaitsRays = all.awaitsRays || all.settled;
+    all.settled = all.settled && isKnown && toCome == 0;
+    return {};
+}
+
 Result<UpdateResult> Renderer::View::updateAll(const FrameRequest& request) {
     if (!isComplete()) return kGone;
     const DeviceWork before = shared->device->work();
@@ -186,6 +207,7 @@ Result<UpdateResult> Renderer::View::updateAll(const FrameRequest& request) {
         all = UpdateResult{.settled = true,
                            .drawable = !shared->datasets.empty(),
                            .errorPixels = std::numeric_limits<double>::infinity()};
+    if (shared->meso && !isCastOnHost()) VCP_TRY(updateHeights(request, *all));
     all->submissions = shared->device->work().submissions - before.submissions;
     all->hostWaits = shared->device->work().waits - before.waits;
     return *std::move(all);

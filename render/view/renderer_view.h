@@ -155,8 +155,9 @@ struct Renderer::View {
     uint64_t stepRays = kPartRays / 8;  // rays of a step
     std::chrono::steady_clock::time_point stepBegan;  // of the step that was submitted last
     std::optional<DoneFrame> lastDone;
-    uint64_t framesDone = 0;  // counts those that were taken in
-    uint64_t mesoSeen = 0;    // Shared::mesoVersion of the last update
+    uint64_t framesDone = 0;                  // counts those that were taken in
+    uint64_t mesoSeen = 0;                    // Shared::mesoVersion of the last update
+    std::optional<FrameRequest> heightsRead;  // of the frame that last said which heights it read
     bool keepsFeedback = false;
     std::optional<FeedbackPicture> feedbackPicture;
 
@@ -185,6 +186,8 @@ struct Renderer::View {
     void forgetFrames();
 
     Result<UpdateResult> updateAll(const FrameRequest& request);
+    /// Takes in heights that have come, and adds what is to come.
+    Result<void> updateHeights(const FrameRequest& request, UpdateResult& all);
     /// Draws a frame and waits for it.
     Result<FrameStats> draw(const FrameRequest& request, const std::function<bool()>& cancel);
     Result<void> drawAhead(const FrameRequest& request, const std::optional<PicturePixel>& cursor);

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "mesostructure/method.h"
+#include "mesostructure/remesh/height_tiles.h"
 #include "mesostructure/solids.h"
 #include "render/meso_surface.h"
 #include "tests/support/meso_surfaces.h"
@@ -126,23 +127,99 @@ TEST_F(RemeshedSurfaces, TheCertificateIsInTheStatistics) {
     EXPECT_EQ(none.uncertifiedPatches, 0u);
 }
 
-TEST_F(RemeshedSurfaces, HeightsBeyondTheBudgetAreRefused) {
-    const MesoSurface surface = surfaceOf(*makeHeightField("needle", 1024, 1), "quad", 0.3);
-    const uint64_t bytes = surface.remeshed.surface->heights->bytes();
-    EXPECT_GT(bytes, uint64_t{2} << 20);
-    EXPECT_LT(bytes, uint64_t{3} << 20);
-    RendererOptions options;
-    for (const bool isEnough : {false, true}) {
-        options.budgetBytes = bytes - (isEnough ? 0 : 1);
-        start(options);
-        const std::vector<MesoSurface> twice{surface, surface};
-        const auto set = renderer_->setSurfaces(twice);
-        ASSERT_EQ(set.ok(), isEnough);
-        if (isEnough) continue;
-        EXPECT_EQ(set.error().code, ErrorCode::Limit);
-        EXPECT_EQ(set.error().line(), "the heights of remeshed surfaces take " + std::to_string(bytes) +
-                                          " bytes, and the budget is " + std::to_string(bytes - 1) + ": allow more");
+/// A map of 2,048 texels an edge takes 348 tiles, 11.6 MB; a part of them is always there.
+class StreamedHeights : public RemeshedSurfaces {
+protected:
+    static constexpr uint64_t kTile = uint64_t{16} * HeightTiles::kQuads;
+
+    static const MesoSurface& surface() {
+        static const MesoSurface made = [] {
+            auto levels = std::make_shared<const HeightLevels>(
+                *HeightLevels::build(*makeHeightField("fbm", 2048, 1), {.fit = LevelFit::Averaged}));
+            MesoSurface it;
+            it.remeshed = {std::make_shared<const RemeshSurface>(
+                               *buildRemeshSurface(*makeBaseSurface("quad", 1), std::move(levels), 0.1)),
+                           {.errorPixels = 0.5}};
+            return it;
+        }();
+        return made;
     }
+    void startWith(uint64_t budgetBytes) {
+        RendererOptions options;
+        options.budgetBytes = budgetBytes;
+        start(options);
+    }
+    static FrameRequest near(double x, double y) {
+        FrameRequest request = lookFrom({0, 0, 0.25});
+        request.camera.eye += glm::dvec3(x, y, 0);
+        return request;
+    }
+};
+
+TEST_F(StreamedHeights, AViewLoadsWhatItReads) {
+    startWith(uint64_t{1} << 30);
+    ASSERT_TRUE(renderer_->setSurfaces(std::span(&surface(), 1)));
+    const FrameStats far = draw(lookFrom({0, 0, 3}));
+    EXPECT_EQ(far.missingHeights, 0u);
+    EXPECT_GT(far.remeshedPixels, 0);
+    EXPECT_LT(far.heightBytes, 60 * kTile);
+    const FrameStats close = draw(near(0.3, 0.2));
+    EXPECT_EQ(close.missingHeights, 0u);
+    EXPECT_GT(close.heightBytes, far.heightBytes);
+    EXPECT_LT(close.heightBytes, 100 * kTile);
+}
+
+TEST_F(StreamedHeights, PicturesDoNotDependOnTheRoom) {
+    startWith(uint64_t{1} << 30);
+    ASSERT_TRUE(renderer_->setSurfaces(std::span(&surface(), 1)));
+    draw(near(0.5, 0.5));
+    const Picture expected = *renderer_->readPicture();
+    const auto depths = *renderer_->readDepth();
+    // Room for little more than the least: each view drives out what the one before had.
+    startWith(uint64_t{4} << 20);
+    ASSERT_TRUE(renderer_->setSurfaces(std::span(&surface(), 1)));
+    for (const double x : {-0.6, -0.2, 0.2, 0.5}) {
+        const FrameStats drawn = draw(near(x, 0.5));
+        EXPECT_EQ(drawn.missingHeights, 0u);
+        EXPECT_LE(drawn.heightBytes, uint64_t{2} << 20);
+    }
+    EXPECT_EQ(renderer_->readPicture()->rgba, expected.rgba);
+    EXPECT_EQ(*renderer_->readDepth(), depths);
+}
+
+TEST_F(StreamedHeights, WhereThereIsNoRoomCoarserHeightsAreDrawnAndItIsSaid) {
+    startWith(uint64_t{3} << 20);
+    MesoSurface fine = surface();
+    fine.remeshed.options.errorPixels = 0.05;
+    ASSERT_TRUE(renderer_->setSurfaces(std::span(&fine, 1)));
+    FrameRequest request = lookFrom({0, 0, 0.9});
+    request.width = request.height = 512;
+    const auto update = renderer_->settle(request);
+    ASSERT_TRUE(update) << update.error().line();
+    EXPECT_TRUE(update->relaxed);
+    EXPECT_EQ(detailOf(*update, 0.05), Detail::Budget);
+    const FrameStats drawn = *renderer_->render(request);
+    EXPECT_GT(drawn.missingHeights, 0u);
+    EXPECT_EQ(drawn.remeshedPixels, 0) << "nothing is certified";
+    EXPECT_EQ(drawn.hitPixels, uint64_t{512} * 512) << "and nothing gapes";
+    // They are as near as the coarser levels are: half of this surface's height of 0.2 would be seen as a cliff.
+    const auto coarse = *renderer_->readDepth();
+    startWith(uint64_t{1} << 30);
+    ASSERT_TRUE(renderer_->setSurfaces(std::span(&fine, 1)));
+    EXPECT_EQ(draw(request).missingHeights, 0u);
+    const auto exact = *renderer_->readDepth();
+    float most = 0;
+    for (size_t i = 0; i < exact.size(); ++i) most = std::max(most, std::abs(exact[i] - coarse[i]));
+    EXPECT_GT(most, 0);
+    EXPECT_LT(most, 0.02f);
+}
+
+TEST_F(StreamedHeights, TheLeastRoomIsSaid) {
+    startWith(uint64_t{1} << 20);
+    const auto set = renderer_->setSurfaces(std::span(&surface(), 1));
+    ASSERT_FALSE(set);
+    EXPECT_EQ(set.error().code, ErrorCode::Limit);
+    EXPECT_NE(set.error().message.find("the heights of a remeshed surface take"), std::string::npos);
 }
 
 TEST_F(RemeshedSurfaces, PlateauOnAQuadIsAPlane) {

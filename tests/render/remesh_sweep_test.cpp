@@ -69,8 +69,11 @@ protected:
         return sweptMesh(*cells.patches().heights);
     }
     Mesh sweptMesh(const HeightLevels& heights) {
-        const MesoTexels levels = *resources_->quads(RemeshLevelBytes(heights).parts());
-        EXPECT_TRUE(pass_->prepare(swept_, pieces_, levels));
+        const std::shared_ptr<const HeightLevels> shared(std::shared_ptr<void>(), &heights);
+        auto pool = HeightPool::create(*device_, shared);
+        EXPECT_TRUE(pool) << pool.error().line();
+        EXPECT_TRUE((*pool)->loadAll());
+        EXPECT_TRUE(pass_->prepare(swept_, pieces_, **pool));
         EXPECT_TRUE(device_->submitAndWait([&](VkCommandBuffer commands) {
             barrierToAll(commands);
             pass_->record(commands, swept_, heights, pieces_.view);

@@ -71,6 +71,7 @@ Result<void> PictureSequence::finish() {
     stats_.colourPixels = std::max(stats_.colourPixels, drawn.colourPixels);
     stats_.remeshedPixels = std::max(stats_.remeshedPixels, drawn.remeshedPixels);
     stats_.uncertifiedPatches = std::max(stats_.uncertifiedPatches, drawn.uncertifiedPatches);
+    stats_.missingHeights = std::max(stats_.missingHeights, drawn.missingHeights);
     stats_.update = drawn.update;
     stats_.onHost = drawn.onHost;
     depth_.clear();

@@ -100,6 +100,7 @@ void TiledPicture::begin(const FrameStats& tile) {
     stats_.ms += tile.msFrame;
     stats_.remeshedPixels = std::max(stats_.remeshedPixels, tile.remeshedPixels);
     stats_.uncertifiedPatches = std::max(stats_.uncertifiedPatches, tile.uncertifiedPatches);
+    stats_.missingHeights = std::max(stats_.missingHeights, tile.missingHeights);
     stats_.onHost = tile.onHost;
 }
 

@@ -40,6 +40,7 @@ struct TiledPictureStats {
     double errorPixels = 0, colourPixels = 0;  ///< largest over the tiles
     double remeshedPixels = 0;                 ///< likewise, as in FrameStats, and the next
     uint64_t uncertifiedPatches = 0;
+    uint32_t missingHeights = 0;
     UpdateResult update;  ///< the last tile's
     bool onHost = false;  ///< likewise, as in FrameStats
 };

@@ -12,6 +12,7 @@
 #include "mesostructure/base/surface_edges.h"
 #include "mesostructure/remesh/remesher.h"
 #include "mesostructure/solids.h"
+#include "viewer/asset/height_image.h"
 #include "viewer/asset/share_out.h"
 #include "viewer/scene/base_light.h"
 #include "viewer/scene/base_mesh.h"
@@ -42,6 +43,21 @@ Result<std::shared_ptr<const MarchArrays>> arraysOf(const Asset& asset, MethodOp
 Result<std::shared_ptr<const Appearance>> farOf(const Asset& asset, double heightScale) {
     VCP_TRY_ASSIGN(const auto shape, shapeOf(asset));
     return std::make_shared<const Appearance>(appearanceOf(*shape, heightScale));
+}
+
+/// Opens what a description names.
+Result<Asset> openSource(const MesoSurfaceDescription& d) {
+    if (d.displacement.empty()) return openMesoAsset(d.asset);
+    Asset asset;
+    asset.name = d.displacement;
+    VCP_TRY_ASSIGN(asset.heights, readHeightImage(d.displacement, 1));
+    asset.extent = asset.heights->extent();
+    return asset;
+}
+
+/// Returns the name of what is opened.
+const std::string& sourceOf(const MesoSurfaceDescription& d) {
+    return d.displacement.empty() ? d.asset : d.displacement;
 }
 
 bool isFile(const MesoSurfaceDescription& d) {
@@ -101,7 +117,7 @@ public:
         // Certified cells take heights from the map, and of coarser levels normals alone.
         const bool isLarge = asset.heights->texels.size() > kMostFittedTexels;
         const LevelFit fit = d.errorPixels > 0 || isLarge ? LevelFit::Averaged : LevelFit::Least;
-        auto& [levels, arrays] = levels_[{d.asset, d.withFilter, fit}];
+        auto& [levels, arrays] = levels_[{sourceOf(d), d.withFilter, fit}];
         if (!levels) {
             if (d.withLightRays) arrays = castingArrays(*asset.heights);
             LevelFitOptions options{.fit = fit};
@@ -130,7 +146,7 @@ public:
                 ? buildShell(base, height, asset.extent, d.offset * d.scale)
                 : Error{.message = fmt::format("rays are marched over at most {} texels along an edge", kMaxGridEdge)};
         if (!shell) {
-            warnings.push_back(fmt::format("{} casts no shadows: {}", d.asset, shell.error().message));
+            warnings.push_back(fmt::format("{} casts no shadows: {}", sourceOf(d), shell.error().message));
             return surface;
         }
         surface.arrays = arrays, surface.shell = *std::move(shell), surface.lift = shadowLift(*arrays, edge);
@@ -164,7 +180,7 @@ Result<Transfer> transferOf(const MesoSurfaceDescription& d, const Asset& asset)
     if (d.heightScale != 1)
         return refused("transfer holds for the asset's own height: leave \"height\" out, or make a higher asset");
     if (!asset.transfer)
-        return refused(fmt::format("{} holds no transfer: make an asset with it, by `vcp meso build`", d.asset));
+        return refused(fmt::format("{} holds no transfer: make an asset with it, by `vcp meso build`", sourceOf(d)));
     return asset.transfer;
 }
 
@@ -301,7 +317,7 @@ Result<MesoScene> makeMesoScene(std::span<const MesoSurfaceDescription> descript
         if (progress && !progress("mesostructure", part)) return Error::cancelled();
         SurfacePath& path = scene.paths.emplace_back(d.path);
         for (glm::dvec3& point : path.points) point -= d.place;
-        auto asset = openMesoAsset(d.asset);
+        auto asset = openSource(d);
         if (!asset) return d.from.blamed(asset.error());
         const auto base = baseOf(d);
         if (!base) return d.from.blamed(base.error());
@@ -323,7 +339,7 @@ Result<MesoScene> makeMesoScene(std::span<const MesoSurfaceDescription> descript
         if (!arrays) {
             Error error = arrays.error();
             if (error.code == ErrorCode::Cancelled) return error;
-            if (error.file.empty() && error.code != ErrorCode::Usage) error.file = d.asset;
+            if (error.file.empty() && error.code != ErrorCode::Usage) error.file = sourceOf(d);
             return d.from.blamed(std::move(error));
         }
         const double edge = tileEdge(*base);
@@ -343,9 +359,9 @@ Result<MesoScene> makeMesoScene(std::span<const MesoSurfaceDescription> descript
             if (!*texture) return texture->error();
         surface.colours = *std::move(colours), surface.normals = *std::move(normals);
         surface.lift = shadowLift(**arrays, edge);
-        if (*transfer) surface.transfer = transfers.try_emplace(d.asset, *transfer).first->second;
+        if (*transfer) surface.transfer = transfers.try_emplace(sourceOf(d), *transfer).first->second;
         if (d.withFar && !*transfer) {
-            auto& far = appearances[{d.asset, d.heightScale}];
+            auto& far = appearances[{sourceOf(d), d.heightScale}];
             if (!far) {
                 VCP_TRY_ASSIGN(far, farOf(*asset, d.heightScale));
             }

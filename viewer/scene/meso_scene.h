@@ -59,6 +59,7 @@ struct SurfacePath {
 
 struct MesoSurfaceDescription {
     std::string asset;           ///< as openMesoAsset
+    std::string displacement;    ///< in its place, a picture of heights (viewer/asset/height_image.h) 1 tile edge high
     meso::MethodOptions method;  ///< its name may be kRemeshMethod
     double cell = 1;             ///< kRemeshMethod: pixels of a cell; with an error, beside jumps of the map
     double errorPixels = 0.5;    ///< kRemeshMethod: what is certified; 0: nothing is, and cells have one size

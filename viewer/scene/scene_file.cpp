@@ -29,8 +29,10 @@ constexpr size_t kMostSurfaces = 64;
 constexpr size_t kMostPathPoints = 1000;                    // of a surface
 constexpr double kShortestPath = 0.1, kLongestPath = 3600;  // seconds
 constexpr int kDeepestScene = 16;
-constexpr int kMostSteps = 4096;                              // of relief mapping
-constexpr int kMostRefinements = 64;                          // of a step of relief mapping
+constexpr int kMostSteps = 4096;      // of relief mapping
+constexpr int kMostRefinements = 64;  // of a step of relief mapping
+// Tile edges that a displacement is high.
+constexpr double kUsualDisplacement = 0.1;
 constexpr double kSmallestCell = 0.25, kLargestCell = 1000;   // pixels, of remeshing
 constexpr double kSmallestError = 0.05, kLargestError = 100;  // pixels, of remeshing
 // Within this range double precision resolves a millimetre where units are metres, and more.
@@ -195,14 +197,19 @@ private:
         made.method.name = "boxes";
         if (!isObject(json, at)) return made;
         onlyKeys(json, at,
-                 {"asset",  "surface", "subdivide",   "tiles",          "height",     "translate",     "scale",
-                  "up",     "colour",  "texture",     "normal_texture", "method",     "cell",          "grid",
-                  "cones",  "steps",   "refinements", "rank",           "directions", "base",          "far",
-                  "offset", "filter",  "path",        "seconds",        "transfer",   "base_transfer", "error"});
-        if (!json.contains("asset"))
-            wrong(at, "\"asset\" is missing");
-        else
+                 {"asset",       "surface",  "subdivide",      "tiles",  "height",      "translate", "scale",  "up",
+                  "colour",      "texture",  "normal_texture", "method", "cell",        "grid",      "cones",  "steps",
+                  "refinements", "rank",     "directions",     "base",   "far",         "offset",    "filter", "path",
+                  "seconds",     "transfer", "base_transfer",  "error",  "displacement"});
+        if (json.contains("displacement")) {
+            if (json.contains("asset")) wrong(at + "/asset", "does not go with \"displacement\"");
+            made.displacement = named(json["displacement"], at + "/displacement", [](const auto&) { return true; });
+            made.method.name = kRemeshMethod, made.heightScale = kUsualDisplacement;
+        } else if (!json.contains("asset")) {
+            wrong(at, "\"asset\" or \"displacement\" is missing");
+        } else {
             made.asset = assetNamed(json["asset"], at + "/asset");
+        }
         made.from = {name_, lines_(at), {}};
         // A base that is not a name of a shape is a mesh.
         const auto bases = meso::baseSurfaceNames();
@@ -518,7 +525,8 @@ std::vector<std::filesystem::path> filesOf(const SceneFile& scene) {
     std::vector<std::filesystem::path> files;
     for (const SceneDataset& dataset : scene.datasets) files.emplace_back(dataset.file);
     for (const MesoSurfaceDescription& surface : scene.surfaces)
-        for (const std::string& name : {surface.asset, surface.base, surface.colourTexture, surface.normalTexture})
+        for (const std::string& name :
+             {surface.asset, surface.displacement, surface.base, surface.colourTexture, surface.normalTexture})
             if (!name.empty()) files.emplace_back(name);
     if (scene.environment && scene.environment->isFile()) files.emplace_back(scene.environment->source);
     return files;

@@ -29,7 +29,11 @@ OrderedJson datasetJson(const SceneDataset& dataset) {
 
 OrderedJson surfaceJson(const MesoSurfaceDescription& surface) {
     const MesoSurfaceDescription usual;
-    OrderedJson json{{"asset", surface.asset}};
+    OrderedJson json;
+    if (surface.displacement.empty())
+        json["asset"] = surface.asset;
+    else
+        json["displacement"] = surface.displacement;
     const auto put = [&](const char* key, const auto& value, const auto& unwritten) {
         if (value != unwritten) json[key] = value;
     };

@@ -1,12 +1,14 @@
 // Scene files: what they say is taken over, and what is wrong is said with line and key.
 #include "viewer/scene/scene_file.h"
 
+#include <algorithm>
 #include <fstream>
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <glm/geometric.hpp>
 
+#include "render/picture.h"
 #include "tests/support/test_folder.h"
 #include "viewer/scene/scene_opening.h"
 
@@ -64,7 +66,10 @@ TEST(SceneFile, WhatIsWrongIsSaidWithItsLine) {
         {inDataset("\"transform\": [[1,0,0,0],[0,2,0,0],[0,0,1,0],[0,0,0,1]]"), 4, "stretches"},
         {inDataset("\"transform\": [[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]],\n\"scale\": 2"), 5, "does not go with"},
         {beside("\"mesostructure\": []"), 3, "1 to 64"},
-        {beside("\"mesostructure\": [{\"tiles\": 2}]"), 3, "\"asset\" is missing"},
+        {beside("\"mesostructure\": [{\"tiles\": 2}]"), 3, "\"asset\" or \"displacement\" is missing"},
+        {beside("\"mesostructure\": [{\"asset\": \"beads\",\n\"displacement\": \"a.png\"}]"), 3,
+         "\"asset\" does not go with"},
+        {beside("\"mesostructure\": [{\n\"displacement\": 1}]"), 4, "must be a name or a file's name"},
         {beside("\"mesostructure\": [{\"asset\": \"beads\",\n\"method\": \"magic\"}]"), 4, "must be one of"},
         {beside("\"mesostructure\": [{\"asset\": \"beads\",\n\"up\": \"x\"}]"), 4, "\"up\""},
         {beside("\"mesostructure\": [{\"asset\": \"beads\",\n\"tiles\": 0}]"), 4, "\"tiles\""},
@@ -296,6 +301,37 @@ TEST(SceneFile, SurfacesMayBeRemeshed) {
             << error;
     EXPECT_NEAR(made->bounds.high.x, 1, 1e-9);
     EXPECT_GT(made->bounds.high.z, 0.01);
+}
+
+TEST(SceneFile, ADisplacementIsAPictureOfHeights) {
+    const TestFolder folder("displacement");
+    const auto file = folder / "heights.png";
+    Picture picture{2, 2, {0, 0, 0, 255, 255, 255, 255, 255, 51, 51, 51, 255, 0, 0, 0, 255}};
+    ASSERT_TRUE(writePng(picture, file));
+    const auto sceneOf = [&](const std::string& more) {
+        return sceneFromJson(R"({"mesostructure": [{"displacement": "heights.png", "tiles": 1)" + more + "}]}",
+                             "m.json", folder.path());
+    };
+    const auto scene = sceneOf(R"(, "height": 0.25)");
+    ASSERT_TRUE(scene) << scene.error().line();
+    EXPECT_EQ(scene->surfaces[0].method.name, kRemeshMethod);
+    EXPECT_EQ(sceneOf("")->surfaces[0].heightScale, 0.1);
+    EXPECT_EQ(std::ranges::count(filesOf(*scene), file), 1);
+    const auto again = sceneFromJson(sceneToJson(*scene), "m.json", {});
+    ASSERT_TRUE(again) << again.error().line();
+    EXPECT_EQ(again->surfaces[0].displacement, file.string());
+    const auto made = makeMesoScene(scene->surfaces);
+    ASSERT_TRUE(made) << made.error().line();
+    const meso::RemeshSurface& surface = *made->surfaces[0].remeshed.surface;
+    // The quad is two units wide and has one tile; the picture's lower row is the map's first.
+    EXPECT_NEAR(surface.high.z - surface.low.z, 0.5, 1e-6);
+    EXPECT_EQ(surface.heights->levels()[0].texels, (std::vector<uint16_t>{51 * 257, 0, 0, 65535}));
+
+    std::ofstream(folder / "broken.png") << "not a picture";
+    const auto broken =
+        sceneFromJson(R"({"mesostructure": [{"displacement": "broken.png"}]})", "m.json", folder.path());
+    ASSERT_TRUE(broken);
+    EXPECT_EQ(makeMesoScene(broken->surfaces).error().file, (folder / "broken.png").string());
 }
 
 TEST(SceneFile, WhatCannotBeRemeshedIsSaid) {
