@@ -104,6 +104,9 @@ struct StoredLevels {
         return {of.texels.data(), of.size, {Real(of.size.x), Real(double(of.size.y) / from->rows())}};
     }
     [[nodiscard]] int remeshLevels() const { return from->used(); }
+    [[nodiscard]] static const RemeshLevel& remeshThere(const RemeshLevel& level, const glm::vec<2, Real>&) {
+        return level;
+    }
     [[nodiscard]] static glm::uvec4 remeshTexels(const RemeshLevel& level, glm::ivec2 at) {
         const uint16_t *low = level.texels16 + size_t(level.size.x) * size_t(at.y),
                        *high = at.y + 1 < level.size.y ? low + level.size.x : level.texels16;

@@ -40,13 +40,20 @@ std::vector<glm::uvec4> HeightTiles::texels(uint32_t tile) const {
     return quads;
 }
 
-/// Whether all of a coarser level is there that a tile's texels lie in.
+/// Whether all of a coarser level is there that a tile's places lie in, and a texel about them: places are rounded.
 bool HeightTiles::isThere(size_t level, glm::ivec2 tile, size_t coarser, const std::vector<uint32_t>& quads) const {
     const glm::ivec2 size = levels_->levels()[level].size, of = levels_->levels()[coarser].size;
-    const glm::ivec2 first = tile * kEdge * of / size / kEdge,
-                     last = glm::min(tile * kEdge + (kEdge - 1), size - 1) * of / size / kEdge;
-    for (int y = first.y; y <= last.y; ++y)
-        for (int x = first.x; x <= last.x; ++x)
+    if (level == coarser) return quads[firsts_[level] + uint32_t(tile.y * tilesOf(level).x + tile.x)] != kNone;
+    const glm::ivec2 first = tile * kEdge * of / size - 1,
+                     last = (glm::min((tile + 1) * kEdge, size) * of - 1) / size + 1;
+    const auto tilesAlong = [&](int axis) {
+        std::vector<int> along;
+        for (int at = first[axis]; at < last[axis]; at += kEdge) along.push_back(wrapped(at, of[axis]) / kEdge);
+        along.push_back(wrapped(last[axis], of[axis]) / kEdge);
+        return along;
+    };
+    for (const int y : tilesAlong(1))
+        for (const int x : tilesAlong(0))
             if (quads[firsts_[coarser] + uint32_t(y * tilesOf(coarser).x + x)] == kNone) return false;
     return true;
 }

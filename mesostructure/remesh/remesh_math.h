@@ -52,7 +52,7 @@ struct RemeshHeights : Levels {
     using Real = T;
     using Real2 = glm::vec<2, T>;
     using Real3 = glm::vec<3, T>;
-    using Levels::remeshLevel, Levels::remeshLevels, Levels::remeshTexels;
+    using Levels::remeshLevel, Levels::remeshLevels, Levels::remeshTexels, Levels::remeshThere;
     using typename Levels::RemeshLevel;
 
 #include "mesostructure/shared/remesh_heights.h"

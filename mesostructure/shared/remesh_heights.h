@@ -4,6 +4,9 @@
 //   uvec4 remeshTexels(CONST_REF(RemeshLevel) level, ivec2 at)     its heights at a texel, of 65535, and after it along
 //                                                                  x, along y, and along both: from all sides, it
 //                                                                  repeats
+//   RemeshLevel remeshThere(CONST_REF(RemeshLevel) level, Real2 at)  the level, or the next coarser one that is there
+//   at
+//                                                                  a place
 //   int remeshLevels()                                             how many there are
 
 // Returns the height of a texel: one product, rounded alike everywhere.
@@ -19,7 +22,8 @@ INLINE int remeshWrapped(Real x, int n) {
 }
 
 // Returns the height of a level at a place in tile units, bilinear; levels repeat as the map does.
-INLINE Real remeshLevelHeight(CONST_REF(RemeshLevel) level, Real2 at) {
+INLINE Real remeshLevelHeight(CONST_REF(RemeshLevel) wanted, Real2 at) {
+    RemeshLevel level = remeshThere(wanted, at);
     PRECISE Real x = at.x * level.texels.x, y = at.y * level.texels.y;
     PRECISE Real left = floor(x), lower = floor(y), u = x - left, v = y - lower;
     uvec4 texels = remeshTexels(level, ivec2(remeshWrapped(left, level.size.x), remeshWrapped(lower, level.size.y)));

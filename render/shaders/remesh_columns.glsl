@@ -37,7 +37,9 @@ void remeshAddTriangle(uint a, uint b, uint c) {
     nextIndex += 3u;
 }
 
-void markHeightTile(int entry) { heightMarks[entry] = heightMarks[0]; }
+void markHeightTile(int entry) {
+    if (heightMarks[entry] != heightMarks[0]) heightMarks[entry] = heightMarks[0];
+}
 
 #include "render/shaders/remesh_piece.glsl"
 

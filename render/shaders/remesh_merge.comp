@@ -21,7 +21,9 @@ uint fetchHit(uint i) { return hits[i]; }
 #include "mesostructure/shared/remesh_layout.h"
 int remeshLevels() { return int(fetchBaseLight(0).x); }
 uvec4 fetchHeightQuad(int i) { return fetchQuad(uint(i)); }
-void markHeightTile(int entry) { heightMarks[entry] = heightMarks[0]; }
+void markHeightTile(int entry) {
+    if (heightMarks[entry] != heightMarks[0]) heightMarks[entry] = heightMarks[0];
+}
 #include "render/shaders/remesh_levels.glsl"
 #include "mesostructure/shared/remesh_heights.h"
 #include "mesostructure/shared/remesh_normal.h"

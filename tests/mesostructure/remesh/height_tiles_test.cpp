@@ -68,13 +68,16 @@ TEST(HeightTiles, EntriesNameTheFinestLevelThatIsThereAtAllTexels) {
                 const auto isAllThere = [&](size_t in) {
                     const glm::ivec2 first(number % along.x * kEdge, number / along.x * kEdge);
                     const glm::ivec2 of = tiles.heights()->levels()[in].size;
-                    for (int j = first.y; j < std::min(first.y + kEdge, size.y); ++j)
-                        for (int i = first.x; i < std::min(first.x + kEdge, size.x); ++i) {
-                            const glm::ivec2 at = glm::ivec2(i, j) * of / size / kEdge;
-                            if (quads[tiles.first(in) + uint32_t(at.y * tilesAlong(tiles, in).x + at.x)] ==
-                                HeightTiles::kNone)
-                                return false;
-                        }
+                    const int about = in == level ? 0 : 1;
+                    for (int j = 2 * first.y; j < 2 * std::min(first.y + kEdge, size.y); ++j)
+                        for (int i = 2 * first.x; i < 2 * std::min(first.x + kEdge, size.x); ++i)
+                            for (const int off : {-about, about}) {
+                                const glm::ivec2 texel = glm::ivec2(i, j) * of / (2 * size) + off;
+                                const glm::ivec2 at(wrapped(texel.x, of.x) / kEdge, wrapped(texel.y, of.y) / kEdge);
+                                if (quads[tiles.first(in) + uint32_t(at.y * tilesAlong(tiles, in).x + at.x)] ==
+                                    HeightTiles::kNone)
+                                    return false;
+                            }
                     return true;
                 };
                 for (size_t in = level; in <= has; ++in) ASSERT_EQ(isAllThere(in), in == has) << level << " " << number;
