@@ -33,7 +33,7 @@ RemeshLook remeshLook(const FrameRequest& request) {
 }  // namespace
 
 Result<void> MesoSurfacePass::setSurfaces(std::span<const MesoSurface> surfaces) {
-    surfaces_.clear(), raster_.forget();
+    surfaces_.clear();
     remeshed_ = 0;
     ++version_;
     std::map<const meso::MarchArrays*, std::shared_ptr<MesoTexels>> uploaded;
