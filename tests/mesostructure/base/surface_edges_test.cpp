@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include "mesostructure/base/manifold_part.h"
 #include "tests/mesostructure/base/surfaces.h"
 
 namespace vcp::meso {
@@ -115,6 +116,22 @@ TEST(SurfaceEdges, FindTheirOtherSides) {
         open += found == numbers.end();
     }
     EXPECT_GT(open, 3u);
+}
+
+TEST(SurfaceEdges, FoldsAreLeftOut) {
+    // Two triangles back to back on an edge of a tetrahedron, and a third one that is no fold.
+    BaseSurface surface = tetrahedron();
+    const BaseSurface whole = surface;
+    surface.positions.push_back({5, 5, 5});
+    surface.triangles.insert(surface.triangles.begin() + 1, {0, 1, 4});
+    surface.triangles.push_back({4, 1, 0});
+    EXPECT_EQ(leaveOutFolds(surface), 2u);
+    EXPECT_EQ(surface.triangles, whole.triangles);
+    EXPECT_EQ(leaveOutFolds(surface), 0u);
+    // Of two on one side and one on the other, one stays.
+    surface.triangles = {{0, 1, 2}, {2, 1, 0}, {1, 2, 0}};
+    EXPECT_EQ(leaveOutFolds(surface), 2u);
+    EXPECT_EQ(surface.triangles, (std::vector<std::array<uint32_t, 3>>{{1, 2, 0}}));
 }
 
 TEST(SurfaceEdges, AFanOfAMillionTakesNoLongerThanItsTriangles) {
