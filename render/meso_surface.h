@@ -8,7 +8,7 @@
 #include "mesostructure/appearance.h"
 #include "mesostructure/base_transfer.h"
 #include "mesostructure/march_arrays.h"
-#include "mesostructure/remesh/remesher.h"
+#include "mesostructure/remesh/certified_cells.h"
 #include "mesostructure/shell.h"
 #include "mesostructure/transfer_volume.h"
 #include "render/meso_texture.h"
@@ -19,6 +19,9 @@ namespace vcp {
 struct RemeshedSurface {
     std::shared_ptr<const meso::RemeshSurface> surface;
     meso::RemeshOptions options;
+    /// Of the surface, where an error is certified; null: its cells have one size. They remember what views measured,
+    /// so one renderer at a time draws with them.
+    std::shared_ptr<meso::CertifiedCells> cells = {};
 };
 
 /// One asset on one base surface: marched, with arrays and a shell, or remeshed. What is remeshed and has both as well

@@ -1,6 +1,8 @@
 #include "mesostructure/base/manifold_part.h"
 
 #include <algorithm>
+#include <array>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -33,6 +35,34 @@ uint64_t keepManifoldPart(BaseSurface& surface) {
     }
     surface.triangles.resize(kept);
     if (!surface.uvs.empty()) surface.uvs.resize(kept);
+    return gone;
+}
+
+uint64_t leaveOutFolds(BaseSurface& surface) {
+    auto& triangles = surface.triangles;
+    // The corners in order, whether they go the other way round, and the number.
+    std::vector<std::tuple<std::array<uint32_t, 3>, bool, uint32_t>> all;
+    all.reserve(triangles.size());
+    for (uint32_t i = 0; i < triangles.size(); ++i) {
+        const auto& t = triangles[i];
+        std::array<uint32_t, 3> corners = t;
+        std::sort(corners.begin(), corners.end());
+        all.emplace_back(corners, (t[0] < t[1]) + (t[1] < t[2]) + (t[2] < t[0]) == 1, i);
+    }
+    std::sort(all.begin(), all.end());
+    std::vector<bool> isLeft(triangles.size(), true);
+    for (size_t first = 0, last = 0; first < all.size(); first = last) {
+        size_t turned = first;
+        for (; last < all.size() && std::get<0>(all[last]) == std::get<0>(all[first]); ++last)
+            turned += !std::get<1>(all[last]);
+        for (size_t i = first, j = turned; i < turned && j < last; ++i, ++j)
+            isLeft[std::get<2>(all[i])] = isLeft[std::get<2>(all[j])] = false;
+    }
+    size_t kept = 0;
+    for (size_t i = 0; i < triangles.size(); ++i)
+        if (isLeft[i]) triangles[kept++] = triangles[i];
+    const uint64_t gone = triangles.size() - kept;
+    triangles.resize(kept);
     return gone;
 }
 

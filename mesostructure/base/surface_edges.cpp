@@ -1,5 +1,7 @@
 #include "mesostructure/base/surface_edges.h"
 
+#include <algorithm>
+
 #include <fmt/format.h>
 
 #include "mesostructure/base/half_edges.h"
@@ -52,6 +54,30 @@ Result<SurfaceEdges> edgesOf(const BaseSurface& surface) {
     }
     edges.parts = countParts(mesh);
     return edges;
+}
+
+std::vector<uint32_t> oppositeEdges(const std::vector<std::array<uint32_t, 3>>& triangles, size_t positions) {
+    std::vector<uint32_t> first(positions + 1, 0), from(3 * triangles.size()), opposite(from.size(), kNoEdge);
+    for (const auto& t : triangles)
+        for (const uint32_t corner : t) ++first[corner + 1];
+    for (size_t i = 1; i < first.size(); ++i) first[i] += first[i - 1];
+    std::vector<uint32_t> next(first.begin(), first.end() - 1);
+    for (size_t i = 0; i < from.size(); ++i) from[next[triangles[i / 3][i % 3]]++] = uint32_t(i);
+    const auto endOf = [&](uint32_t edge) { return triangles[edge / 3][(edge + 1) % 3]; };
+    // Of corners at which many meet, the edges are in the order of their ends.
+    constexpr uint32_t kMany = 32;
+    const auto hasMany = [&](size_t corner) { return first[corner + 1] - first[corner] > kMany; };
+    const auto at = [&](size_t place) { return from.begin() + std::ptrdiff_t(place); };
+    for (size_t i = 0; i < positions; ++i)
+        if (hasMany(i)) std::ranges::sort(at(first[i]), at(first[i + 1]), {}, endOf);
+    for (uint32_t i = 0; i < from.size(); ++i) {
+        const uint32_t start = triangles[i / 3][i % 3], end = endOf(i);
+        const auto last = at(first[end + 1]);
+        const auto found = hasMany(end) ? std::ranges::lower_bound(at(first[end]), last, start, {}, endOf)
+                                        : std::ranges::find(at(first[end]), last, start, endOf);
+        if (found != last && endOf(*found) == start) opposite[i] = *found;
+    }
+    return opposite;
 }
 
 }  // namespace vcp::meso

@@ -1,8 +1,11 @@
 // The edges of a surface: whether it is closed, how many parts it has, where its map has seams.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "mesostructure/base_surface.h"
 
@@ -22,5 +25,10 @@ struct SurfaceEdges {
 /// in range. Errors: InvalidInput, with triangle and place, where an edge has three triangles, or two that run along it
 /// in one direction. Parts may touch at a corner.
 Result<SurfaceEdges> edgesOf(const BaseSurface& surface);
+
+/// Returns for each edge of triangle i, from corner k to the next, at 3 i + k, 3 j + l of the other triangle that has
+/// it; kNoEdge where there is none. Each edge has two triangles at most, which run along it in different directions.
+inline constexpr uint32_t kNoEdge = ~uint32_t{0};
+std::vector<uint32_t> oppositeEdges(const std::vector<std::array<uint32_t, 3>>& triangles, size_t positions);
 
 }  // namespace vcp::meso

@@ -1,15 +1,15 @@
 #include "mesostructure/remesh/certified_cells.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
-#include <cstring>
 #include <limits>
-#include <map>
 #include <unordered_map>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
+#include "mesostructure/base/surface_edges.h"
 #include "mesostructure/remesh/height_bends.h"
 #include "mesostructure/remesh/height_deviation.h"
 #include "mesostructure/remesh/piece_maker.h"
@@ -38,6 +38,8 @@ constexpr size_t kMostKnown = 64;
 // and less is certified.
 constexpr double kNarrowestPixels = 0.125, kLeastNarrowPixels = 1;
 constexpr double kMostCells = 1 << 23;
+// What is done when the surface is cut, and when all but the kinds of patches is known: parts of the time.
+constexpr double kCuttingPart = 0.7, kKindsPart = 0.8;
 constexpr double kNothing = std::numeric_limits<double>::infinity();
 
 float roundedUp(double x) { return std::nextafter(float(x), std::numeric_limits<float>::infinity()); }
@@ -74,16 +76,29 @@ struct CertifiedCells::View {
     std::vector<dvec3> positions, directions;
 };
 
-Result<CertifiedCells> CertifiedCells::create(const RemeshSurface& surface) {
+Result<CertifiedCells> CertifiedCells::create(const RemeshSurface& surface,
+                                              const std::function<bool(double part)>& progress) {
+    double most = 0;
+    const auto told = [&](double part) {
+        most = std::max(most, part);
+        return !progress || progress(most);
+    };
+    // Where there would be too many small patches, cutting begins anew.
+    const auto toldOfCutting = [&](double part) { return told(kCuttingPart * part); };
     CertifiedCells made;
     const int edge = patchEdge(surface);
     made.finest_ = std::min(kLog2FinestCells, kLog2MostCells - edge);
     made.coarsest_ = edge + made.finest_;
     const HeightBends bends(*surface.heights);
-    auto cut =
-        cutSurface(surface, {.mostTexels = std::exp2(edge), .bends = &bends, .mostTriangles = kMostSmallPatches});
-    if (!cut) cut = cutSurface(surface, {.mostTexels = std::exp2(edge), .mostTriangles = kMostPatches});
+    auto cut = cutSurface(surface, {.mostTexels = std::exp2(edge),
+                                    .bends = &bends,
+                                    .mostTriangles = kMostSmallPatches,
+                                    .progress = toldOfCutting});
+    if (!cut && cut.error().code == ErrorCode::Limit)
+        cut = cutSurface(surface,
+                         {.mostTexels = std::exp2(edge), .mostTriangles = kMostPatches, .progress = toldOfCutting});
     VCP_TRY_ASSIGN(made.patches_, std::move(cut));
+    if (!told(kCuttingPart)) return Error::cancelled();
     const dvec2 texels = surface.heights->texels() * std::exp2(made.finest_);
     for (const auto& uvs : made.patches_.uvs) {
         std::array<dvec2, 3> at;
@@ -94,26 +109,28 @@ Result<CertifiedCells> CertifiedCells::create(const RemeshSurface& surface) {
         auto& grid = made.grids_.emplace_back();
         for (size_t k = 0; k < 3; ++k) grid[k] = glm::ivec2(at[k] - from);
     }
-    made.addEdges(), made.measureCorners(), made.addKinds();
+    made.addEdges(), made.measureCorners();
+    if (!told(kKindsPart)) return Error::cancelled();
+    made.addKinds();
+    if (!told(1)) return Error::cancelled();
     return made;
 }
 
 void CertifiedCells::addEdges() {
-    std::unordered_map<uint64_t, uint32_t> numbers;
+    const std::vector<uint32_t> opposite = oppositeEdges(patches_.triangles, patches_.positions.size());
     for (uint32_t i = 0; i < patches_.triangles.size(); ++i) {
         auto& own = edges_.emplace_back();
-        for (size_t k = 0; k < 3; ++k) {
-            const uint32_t a = patches_.triangles[i][k], b = patches_.triangles[i][(k + 1) % 3];
+        for (uint32_t k = 0; k < 3; ++k) {
             const glm::ivec2 off = glm::abs(grids_[i][(k + 1) % 3] - grids_[i][k]);
             const int parts = std::max({off.x, off.y, 1});
-            const auto [found, isNew] =
-                numbers.try_emplace((uint64_t{std::min(a, b)} << 32) | std::max(a, b), uint32_t(neighbours_.size()));
-            own[k] = found->second;
-            if (isNew) {
-                neighbours_.push_back({i, i}), edgeParts_.push_back(parts);
-            } else {
+            const uint32_t beside = opposite[3 * i + k];
+            if (beside < 3 * i + k) {
                 // Along a seam the two sides may have different texels.
+                own[k] = edges_[beside / 3][beside % 3];
                 neighbours_[own[k]][1] = i, edgeParts_[own[k]] = std::min(edgeParts_[own[k]], parts);
+            } else {
+                own[k] = uint32_t(neighbours_.size());
+                neighbours_.push_back({i, i}), edgeParts_.push_back(parts);
             }
         }
     }
@@ -130,30 +147,38 @@ void CertifiedCells::measureCorners() {
 }
 
 void CertifiedCells::addKinds() {
-    // Corners' places in the tile of the first, their cells, directions and heights; all as words.
-    std::map<std::vector<uint32_t>, uint32_t> numbers;
+    // What patches of a kind have in common, corner by corner.
+    struct Corner {
+        glm::vec2 at;  // in the tile of the first
+        glm::ivec2 grid;
+        glm::vec3 direction;
+        std::array<uint32_t, 2> height;  // a double's
+    };
+    static_assert(sizeof(Corner) == 36);
+    using Key = std::array<uint32_t, 3 * sizeof(Corner) / sizeof(uint32_t)>;
+    const auto hashOf = [](const Key& key) {
+        uint64_t hash = 0;
+        for (const uint32_t word : key) hash = (std::rotl(hash, 23) ^ word) * 0x9e3779b97f4a7c15u;
+        return size_t(hash ^ hash >> 32);
+    };
+    std::unordered_map<Key, uint32_t, decltype(hashOf)> numbers(0, hashOf);
     kindOf_.resize(patches_.triangles.size());
     for (uint32_t i = 0; i < kindOf_.size(); ++i) {
         const auto& uvs = patches_.uvs[i];
         const glm::vec2 tile = glm::floor(glm::min(uvs[0], glm::min(uvs[1], uvs[2])));
-        std::vector<uint32_t> key;
-        const auto add = [&](const auto& value) {
-            const size_t at = key.size();
-            key.resize(at + sizeof value / sizeof(uint32_t));
-            std::memcpy(&key[at], &value, sizeof value);
-        };
+        std::array<Corner, 3> corners;
         bool mayJump = tile.y != 0 && patches_.heights->rows() != 1;
         for (size_t k = 0; k < 3; ++k) {
             const uint32_t corner = patches_.triangles[i][k];
-            add(glm::vec2(uvs[k] - tile)), add(grids_[i][k]), add(patches_.directions[corner]), add(heights_[corner]);
+            corners[k] = {uvs[k] - tile, grids_[i][k], patches_.directions[corner],
+                          std::bit_cast<std::array<uint32_t, 2>>(heights_[corner])};
             mayJump = mayJump || patches_.firstPlace[corner + 1] - patches_.firstPlace[corner] > 1;
         }
+        kindOf_[i] = uint32_t(kinds_.size());
         // What is beyond a seam is not in the key.
-        if (mayJump) key.assign(1, i);
-        const auto [found, isNew] = numbers.try_emplace(std::move(key), uint32_t(kinds_.size()));
-        if (isNew) kinds_.emplace_back().mayJump = mayJump;
-        kindOf_[i] = found->second;
-        kinds_[found->second].patches.push_back(i);
+        if (!mayJump) kindOf_[i] = numbers.try_emplace(std::bit_cast<Key>(corners), kindOf_[i]).first->second;
+        if (kindOf_[i] == kinds_.size()) kinds_.emplace_back().mayJump = mayJump;
+        kinds_[kindOf_[i]].patches.push_back(i);
     }
     for (const auto& [a, b] : neighbours_) isJump_.push_back(kinds_[kindOf_[a]].mayJump || kinds_[kindOf_[b]].mayJump);
 }

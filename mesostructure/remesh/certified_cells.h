@@ -36,6 +36,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <utility>
 #include <vector>
@@ -59,8 +60,10 @@ struct PatchCells {
 
 class CertifiedCells {
 public:
-    /// Cuts a surface into patches. Errors: Limit (more than 2^22 patches).
-    static Result<CertifiedCells> create(const RemeshSurface& surface);
+    /// Cuts a surface into patches. `progress`: takes the part that is done, from 0 to 1; false cancels. Errors: Limit
+    /// (more than 2^22 patches); Cancelled.
+    static Result<CertifiedCells> create(const RemeshSurface& surface,
+                                         const std::function<bool(double part)>& progress = {});
 
     /// Chooses the cells of a view: errors of at most options.errorPixels on the screen, where the finest cells can,
     /// and beside a jump of the map at most options.cell pixels wide. Fills in boundPixels, looked and uncertified.

@@ -67,19 +67,15 @@ void addDensities(RemeshSurface& surface) {
 
 /// Finds the edges along which the two sides' texture coordinates differ.
 void addSeams(RemeshSurface& surface) {
-    std::unordered_map<uint64_t, std::pair<uint32_t, int>> sides;  // by (to, from): triangle and corner
-    const auto key = [](uint32_t from, uint32_t to) { return (uint64_t{from} << 32) | to; };
-    for (uint32_t i = 0; i < surface.triangles.size(); ++i)
-        for (int k = 0; k < 3; ++k) sides[key(surface.triangles[i][k], surface.triangles[i][(k + 1) % 3])] = {i, k};
+    const std::vector<uint32_t> opposite = oppositeEdges(surface.triangles, surface.positions.size());
     for (size_t i = 0; i < surface.triangles.size(); ++i) {
         auto& seams = surface.seams.emplace_back();
         seams.fill(RemeshSurface::kNoSeam);
-        for (int k = 0; k < 3; ++k) {
-            const auto found = sides.find(key(surface.triangles[i][(k + 1) % 3], surface.triangles[i][k]));
-            if (found == sides.end()) continue;
-            const auto& other = surface.uvs[found->second.first];
-            const int corner = found->second.second;
-            const std::array<vec2, 2> beyond{other[(corner + 1) % 3], other[corner]};
+        for (size_t k = 0; k < 3; ++k) {
+            const uint32_t side = opposite[3 * i + k];
+            if (side == kNoEdge) continue;
+            const auto& other = surface.uvs[side / 3];
+            const std::array<vec2, 2> beyond{other[(side + 1) % 3], other[side % 3]};
             if (beyond[0] == surface.uvs[i][k] && beyond[1] == surface.uvs[i][(k + 1) % 3]) continue;
             seams[k] = uint32_t(surface.seamUvs.size());
             surface.seamUvs.push_back(beyond);
@@ -116,17 +112,20 @@ public:
     }
 
     Result<RemeshSurface> run(const RemeshSurface& from) {
+        for (const auto& uvs : from.uvs) area_ += areaOf(uvs);
         for (size_t i = 0; i < from.triangles.size(); ++i) {
-            Part part{from.triangles[i], from.uvs[i], {}, from.baseTriangles[i]};
-            for (int k = 0; k < 3; ++k) {
+            Part part{from.triangles[i], from.uvs[i], {}, {}, from.baseTriangles[i]};
+            for (size_t k = 0; k < 3; ++k) {
                 const uint32_t seam = from.seams[i][k];
                 part.beyond[k] = seam != RemeshSurface::kNoSeam
                                      ? from.seamUvs[seam]
                                      : std::array<vec2, 2>{part.uvs[k], part.uvs[(k + 1) % 3]};
             }
+            for (size_t k = 0; k < 3; ++k) part.tooLong[k] = tooLong(part, k);
             open_.push_back(part);
             while (!open_.empty()) VCP_TRY(step());
         }
+        middles_.clear();
         addDensities(cut_), addSeams(cut_), addPlaces(cut_);
         return std::move(cut_);
     }
@@ -136,8 +135,14 @@ private:
         std::array<uint32_t, 3> corners;
         std::array<vec2, 3> uvs;
         std::array<std::array<vec2, 2>, 3> beyond;  ///< the other side's coordinates of the edges
+        std::array<double, 3> tooLong;              ///< as the function, of the edges
         uint32_t baseTriangle = 0;
     };
+
+    static double areaOf(const std::array<vec2, 3>& uvs) {
+        const dvec2 a = dvec2(uvs[1]) - dvec2(uvs[0]), b = dvec2(uvs[2]) - dvec2(uvs[0]);
+        return std::abs(a.x * b.y - a.y * b.x);
+    }
 
     /// Returns the length of an edge in texels, the longer of its two sides', where it is halved; else 0. It depends on
     /// the edge alone.
@@ -177,28 +182,31 @@ private:
     }
 
     Result<void> step() {
+        constexpr uint64_t kTold = 1 << 14;  // steps
         const Part part = open_.back();
         open_.pop_back();
-        std::array<double, 3> lengths;
-        for (size_t k = 0; k < 3; ++k) lengths[k] = tooLong(part, k);
-        const size_t longest = size_t(std::ranges::max_element(lengths) - lengths.begin());
-        if (lengths[longest] == 0) {
+        const size_t longest = size_t(std::ranges::max_element(part.tooLong) - part.tooLong.begin());
+        if (part.tooLong[longest] == 0) {
             cut_.triangles.push_back(part.corners), cut_.uvs.push_back(part.uvs);
             cut_.baseTriangles.push_back(part.baseTriangle);
+            areaDone_ += areaOf(part.uvs);
         } else {
-            halve(part, longest, lengths);
+            halve(part, longest);
         }
         if (cut_.triangles.size() + open_.size() > options_.mostTriangles)
             return Error{.code = ErrorCode::Limit,
                          .message = fmt::format("a remeshed surface of more than {} patches of {} texels",
                                                 options_.mostTriangles, options_.mostTexels)};
+        const double done = area_ > 0 ? std::min(areaDone_ / area_, 1.0) : 0;
+        if (steps_++ % kTold == 0 && options_.progress && !options_.progress(done)) return Error::cancelled();
         return {};
     }
 
     /// Halves the longest edge, and with it one that is nearly as long: the two middles are joined, so that what is
     /// narrow gets shorter, not narrower.
-    void halve(const Part& part, size_t k, const std::array<double, 3>& lengths) {
+    void halve(const Part& part, size_t k) {
         constexpr double kNearly = 0.75;
+        const auto& lengths = part.tooLong;
         const size_t next = (k + 1) % 3, other = (k + 2) % 3;
         const auto [first, second] = halved(part, k);
         const bool isNext = lengths[next] >= lengths[other];
@@ -222,6 +230,9 @@ private:
         first.uvs[next] = second.uvs[k] = middle.uv;
         first.beyond[k][1] = second.beyond[k][0] = middle.beyond;
         first.beyond[next] = {middle.uv, part.uvs[other]}, second.beyond[other] = {part.uvs[other], middle.uv};
+        first.tooLong[k] = tooLong(first, k), second.tooLong[k] = tooLong(second, k);
+        // The edge between the halves.
+        first.tooLong[next] = second.tooLong[other] = tooLong(first, next);
         return {first, second};
     }
 
@@ -296,15 +307,20 @@ private:
             cut_.positions.push_back(between(cut_.positions[a], cut_.positions[b]));
             cut_.directions.push_back(between(cut_.directions[a], cut_.directions[b]));
         }
-        return {found->second, between(part.uvs[first], part.uvs[second]),
-                isTurned ? between(end, start) : between(start, end)};
+        const Middle middle{found->second, between(part.uvs[first], part.uvs[second]),
+                            isTurned ? between(end, start) : between(start, end)};
+        // An edge has two sides at most: the second asks last.
+        if (!isNew) middles_.erase(found);
+        return middle;
     }
 
     const CutOptions& options_;
     dvec2 texels_;
     RemeshSurface cut_;
     std::vector<Part> open_;
-    std::unordered_map<uint64_t, uint32_t> middles_;
+    std::unordered_map<uint64_t, uint32_t> middles_;  // of edges that were halved from one side
+    double area_ = 0, areaDone_ = 0;                  // of the map, twice
+    uint64_t steps_ = 0;
 };
 
 }  // namespace

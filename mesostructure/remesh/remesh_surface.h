@@ -8,6 +8,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <vector>
 
@@ -52,10 +53,11 @@ struct CutOptions {
     const HeightBends* bends = nullptr;  ///< of the map; null: it is steep nowhere
     double mostSteepTexels = 4;          ///< of an edge where the map is steep, or jumps along it
     uint64_t mostTriangles = uint64_t{1} << 22;
+    std::function<bool(double part)> progress = {};  ///< takes the part that is done, from 0 to 1; false cancels
 };
 
 /// Returns the same surface in triangles with shorter edges: longer ones are halved, along both sides of an edge alike.
-/// Errors: Limit (more than `mostTriangles`).
+/// Errors: Limit (more than `mostTriangles`); Cancelled.
 Result<RemeshSurface> cutSurface(const RemeshSurface& surface, const CutOptions& options);
 
 }  // namespace vcp::meso

@@ -53,7 +53,7 @@ Result<HeightPool*> MesoSurfacePass::heightsFor(const RemeshedSurface& surface, 
 }
 
 Result<void> MesoSurfacePass::setSurfaces(std::span<const MesoSurface> surfaces, uint64_t heightBytes) {
-    surfaces_.clear(), heights_.clear(), raster_.forget();
+    surfaces_.clear(), heights_.clear();
     remeshed_ = 0;
     ++version_;
     std::map<const meso::MarchArrays*, std::shared_ptr<MesoTexels>> uploaded;

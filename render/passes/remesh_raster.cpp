@@ -86,13 +86,8 @@ Result<void> RemeshRaster::remesh(RemeshTarget& target, size_t number, const Rem
                                   const HeightPool& heights, const RemeshLook& look) {
     RemeshDrawing& drawing = target.drawings[number];
     const meso::RemeshCamera camera = cameraOf(*surface.surface, look);
-    if (surface.options.errorPixels > 0) {
-        auto found = cells_.find(surface.surface.get());
-        if (found == cells_.end()) {
-            VCP_TRY_ASSIGN(auto cells, meso::CertifiedCells::create(*surface.surface));
-            found = cells_.emplace(surface.surface.get(), std::move(cells)).first;
-        }
-        VCP_TRY(meso::makeRemeshPieces(found->second, camera, surface.options, target.pieces, sweep_.limits()));
+    if (surface.cells) {
+        VCP_TRY(meso::makeRemeshPieces(*surface.cells, camera, surface.options, target.pieces, sweep_.limits()));
     } else {
         VCP_TRY(meso::makeRemeshPieces(*surface.surface, camera, surface.options, target.pieces, sweep_.limits()));
     }

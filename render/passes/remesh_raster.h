@@ -2,13 +2,10 @@
 // (passes/remesh_sweep.h) and rasterizes the triangles into images of the picture's size; a compute pass takes those of
 // their pixels into the mesostructure's hits that are nearer (shaders/remesh.vert, remesh.frag, remesh_merge.comp).
 //
-// A surface of which an error is certified (certified_cells.h) keeps its patches here from frame to frame.
-//
 // Reads levels, pieces, hits; writes images, hits. Barriers are recorded here; begins and ends with barrierToAll.
 #pragma once
 
 #include <array>
-#include <map>
 
 #include "render/camera.h"
 #include "render/meso_surface.h"
@@ -59,11 +56,8 @@ public:
 
     /// Makes the images. Errors: Device; Limit; Unsupported, as RasterPipeline::create.
     Result<void> prepare(RemeshTarget& target, PictureSize size, size_t surfaces);
-    /// Forgets what is known of surfaces, which are no more.
-    void forget() { cells_.clear(); }
     /// Makes and uploads the pieces of a surface for a view. `heights`: the surface's.
-    /// Precondition: no frame in flight uses the target. Errors: Device; those of meso::makeRemeshPieces and
-    /// of meso::CertifiedCells::create.
+    /// Precondition: no frame in flight uses the target. Errors: Device; those of meso::makeRemeshPieces.
     Result<void> remesh(RemeshTarget& target, size_t number, const RemeshedSurface& surface, const HeightPool& heights,
                         const RemeshLook& look);
     /// Sweeps a surface's pieces, draws them into the images and copies these.
@@ -74,7 +68,6 @@ private:
     Device& device_;
     RemeshSweepPass sweep_;
     RasterPipeline pipeline_;
-    std::map<const meso::RemeshSurface*, meso::CertifiedCells> cells_;  ///< of those with a certified error
 };
 
 }  // namespace vcp

@@ -32,6 +32,12 @@ protected:
                          {.cell = cell}};
         return made;
     }
+    static void certify(MesoSurface& made, double errorPixels) {
+        made.remeshed.options.errorPixels = errorPixels;
+        made.remeshed.cells.reset();
+        if (errorPixels > 0)
+            made.remeshed.cells = std::make_shared<CertifiedCells>(*CertifiedCells::create(*made.remeshed.surface));
+    }
     static MesoSurface marchedOf(const Asset& asset, std::string_view base, double height) {
         const auto shape = shapeOf(asset);
         const auto method = buildMethod(asset, **shape, {.name = "pyramid"});
@@ -46,7 +52,7 @@ protected:
     static MesoSurface castingOf(const Asset& asset, std::string_view base, double height, double errorPixels) {
         MesoSurface made = marchedOf(asset, base, height);
         made.remeshed = surfaceOf(*asset.heights, base, height).remeshed;
-        made.remeshed.options.errorPixels = errorPixels;
+        certify(made, errorPixels);
         return made;
     }
     static Asset assetOf(HeightMap map) {
@@ -112,7 +118,7 @@ protected:
 TEST_F(RemeshedSurfaces, TheCertificateIsInTheStatistics) {
     MesoSurface surface = surfaceOf(*makeHeightField("fbm", 64, 1), "quad", 0.3);
     const auto statsAt = [&](double errorPixels, glm::dvec3 eye) {
-        surface.remeshed.options.errorPixels = errorPixels;
+        certify(surface, errorPixels);
         EXPECT_TRUE(renderer_->setSurfaces(std::span(&surface, 1)).ok());
         return RendererFixture::draw(lookFrom(eye));
     };
@@ -352,7 +358,7 @@ TEST_F(RemeshedSurfaces, NearerOfDatasetAndSurfaceIsSeenAndShadesTheOther) {
     const auto plateauAt = [](glm::dvec3 place) {
         MesoSurface made = vcp::test::mesoSurface(vcp::test::plateau(), "pyramid", "quad", 1, 2, place);
         made.remeshed = surfaceOf(plateau(), "quad", 1, 1, place).remeshed;
-        made.remeshed.options.errorPixels = 0.5;
+        certify(made, 0.5);
         return made;
     };
     const vcp::test::Scene cube = vcp::test::cubeScene(0);

@@ -12,6 +12,7 @@
 #include "mesostructure/base/surface_edges.h"
 #include "mesostructure/shell.h"
 #include "viewer/bake/bake_files.h"
+#include "viewer/bake/coarsened_scan.h"
 #include "viewer/bake/decimated_base.h"
 #include "viewer/bake/displaced_mesh.h"
 #include "viewer/export/surface_mesh.h"
@@ -24,8 +25,12 @@ namespace {
 using namespace meso;
 
 constexpr uint64_t kMostOfBase = 1'000'000, kMeasured = 200'000;
-/// Memory for each triangle of a scan that is held, once as it was read and once joined.
-constexpr uint64_t kHeldBytes = 200;
+/// Memory for each triangle of a scan that is held, once as it was read and once joined; and of one that is measured.
+constexpr uint64_t kHeldBytes = 200, kMeasuredBytes = 400;
+/// Memory for each triangle of a mesh that is decimated.
+constexpr uint64_t kDecimationBytes = 800;
+/// Triangles that a large scan is made coarser to; at least so many times those of the base.
+constexpr uint64_t kCoarsened = 2'000'000, kLeastOverBase = 2;
 
 /// Where the parts of the work lie in the whole.
 struct Part {
@@ -33,7 +38,9 @@ struct Part {
     double from, to;
 };
 constexpr Part kReading{"reading the scan", 0, 0.1}, kDecimating{"making the base", 0.1, 0.4},
-    kSampling{"sampling", 0.4, 0.85}, kWriting{"writing", 0.85, 0.9}, kMeasuring{"measuring", 0.9, 0.95},
+    kCoarsening{"making the scan coarser", 0, 0.25}, kDecimatingCoarse{"making the base", 0.25, 0.4},
+    kSampling{"sampling", 0.4, 0.85}, kWriting{"writing", 0.85, 0.88},
+    kReadingAgain{"reading the scan again", 0.88, 0.9}, kMeasuring{"measuring", 0.9, 0.95},
     kMeasuringBack{"measuring back", 0.95, 1};
 
 /// An error of the base is said with the base's name.
@@ -54,10 +61,13 @@ public:
             return Error{.code = ErrorCode::Unsupported,
                          .message = "was built by the paper's method; build it by the other to bake it",
                          .file = reader_->name()};
-        if (options_.base.empty() || options_.measured) VCP_TRY(readScan());
-        VCP_TRY(options_.base.empty() ? decimateScan() : readBase());
+        if (options_.measured && figures_.scanTriangles * kMeasuredBytes > options_.memoryBytes)
+            return tooLarge(
+                fmt::format("and measuring them takes {} MiB of memory, more than the memory cap; leave out "
+                            "the measuring",
+                            figures_.scanTriangles * kMeasuredBytes >> 20));
+        VCP_TRY(options_.base.empty() ? makeBase() : readBase());
         VCP_TRY_ASSIGN(const TexelMap map, mapOf());
-        if (!options_.measured) scan_ = {};
         const std::vector<glm::dvec3> directions = shellDirections(base_);
         const BaseFrames frames = framesOf(base_, map, directions);
         auto maps = bakeMaps(reader_, dataset_, base_, map, frames, directions,
@@ -93,40 +103,73 @@ private:
         return options_.base.empty() ? reader_->name() : options_.base.string();
     }
 
-    Result<void> readScan() {
-        const uint64_t count = dataset_.header.triangles;
-        const auto tooLarge = [&](std::string why) {
-            return Error{
-                .code = ErrorCode::Limit,
-                .message = fmt::format("has {} triangles, {}; {}", count, why,
-                                       options_.base.empty() ? "give a base of your own" : "leave out the measuring"),
+    [[nodiscard]] Error tooLarge(std::string why) const {
+        return {.code = ErrorCode::Limit,
+                .message = fmt::format("has {} triangles, {}", figures_.scanTriangles, why),
                 .file = reader_->name()};
-        };
-        if (count > kMostDecimated)
-            return tooLarge(fmt::format("and at most {} are held in memory here", kMostDecimated));
-        if (count * kDecimationBytes > options_.memoryBytes)
-            return tooLarge(
-                fmt::format("which takes {} MiB of memory, more than the memory cap", count * kDecimationBytes >> 20));
-        VCP_TRY_ASSIGN(const auto cut, SurfaceCut::create(dataset_, reader_->name(), UINT32_MAX));
+    }
+
+    /// Returns the finest level, where it is the mesh itself.
+    Result<SurfaceCut> finestMesh() const {
+        VCP_TRY_ASSIGN(auto cut, SurfaceCut::create(dataset_, reader_->name(), UINT32_MAX));
         if (!cut.isMesh() && options_.base.empty())
             return Error{.code = ErrorCode::Unsupported,
                          .message =
                              "its finest level is not the mesh itself, which a base could be made from; build it "
                              "anew, or give a base of your own",
                          .file = reader_->name()};
-        VCP_TRY_ASSIGN(scan_, loadSurface(*reader_, cut, {.colour = false, .progress = progress(kReading)}));
-        if (scan_.mesh.triangles.empty())
+        return cut;
+    }
+
+    Result<LoadedSurface> readScan(const Part& part) const {
+        VCP_TRY_ASSIGN(const auto cut, finestMesh());
+        VCP_TRY_ASSIGN(auto scan, loadSurface(*reader_, cut, {.colour = false, .progress = progress(part)}));
+        if (scan.mesh.triangles.empty())
             return Error{.code = ErrorCode::InvalidInput, .message = "has no triangle", .file = reader_->name()};
+        return scan;
+    }
+
+    Result<void> makeBase() {
+        const uint64_t count = figures_.scanTriangles;
+        const bool isLarge = count > options_.mostDecimated || count * kDecimationBytes > options_.memoryBytes;
+        if (isLarge) return coarsenAndDecimate();
+        VCP_TRY_ASSIGN(LoadedSurface scan, readScan(kReading));
+        return decimate(scan.mesh, 0, kDecimating);
+    }
+
+    Result<void> coarsenAndDecimate() {
+        // Half of the memory is for what is decimated while the scan is read.
+        const uint64_t most = std::min(options_.memoryBytes / 2 / kDecimationBytes, options_.mostDecimated),
+                       least = kLeastOverBase * options_.triangles;
+        if (most < least)
+            return tooLarge(fmt::format("and a base of {} of them takes {} MiB of memory, more than the memory cap",
+                                        options_.triangles, (2 * least * kDecimationBytes >> 20) + 1));
+        VCP_TRY_ASSIGN(const auto cut, finestMesh());
+        VCP_TRY_ASSIGN(CoarsenedScan scan, coarsenScan(*reader_, cut,
+                                                       {.triangles = std::min(most, std::max(kCoarsened, least)),
+                                                        .memoryBytes = options_.memoryBytes,
+                                                        .progress = progress(kCoarsening)}));
+        if (scan.mesh.triangles.empty())
+            return Error{.code = ErrorCode::InvalidInput, .message = "has no triangle", .file = reader_->name()};
+        if (scan.mesh.triangles.size() * kDecimationBytes > options_.memoryBytes)
+            return tooLarge(
+                fmt::format("and {} of them are left where no more can go, which take {} MiB of memory, more "
+                            "than the memory cap; give a base of your own",
+                            scan.mesh.triangles.size(), scan.mesh.triangles.size() * kDecimationBytes >> 20));
+        figures_.coarseTriangles = scan.mesh.triangles.size();
+        VCP_TRY(decimate(scan.mesh, scan.away, kDecimatingCoarse));
+        figures_.scanVertices = scan.vertices, figures_.leftOut += scan.leftOut;
         return {};
     }
 
-    Result<void> decimateScan() {
-        auto made = decimateToFollow(reader_, dataset_, scan_.mesh,
+    Result<void> decimate(const IndexedMesh& mesh, double away, const Part& part) {
+        auto made = decimateToFollow(reader_, dataset_, mesh,
                                      {.triangles = options_.triangles,
                                       .texels = options_.texels,
                                       .reach = options_.reach,
-                                      .memoryBytes = options_.memoryBytes - kHeldBytes * scan_.mesh.triangles.size(),
-                                      .progress = progress(kDecimating)});
+                                      .scanAway = away,
+                                      .memoryBytes = options_.memoryBytes - kHeldBytes * mesh.triangles.size(),
+                                      .progress = progress(part)});
         if (!made) return named(made.error(), reader_->name());
         base_ = std::move(made->surface);
         figures_.leftOut = made->leftOut, figures_.reach = made->reach;
@@ -161,8 +204,9 @@ private:
         VCP_TRY_ASSIGN(const auto surface, readBaseMesh(folder_ / "base.obj", 1));
         VCP_TRY_ASSIGN(const auto asset, readAsset(folder_ / "heights.meso"));
         VCP_TRY_ASSIGN(const IndexedMesh displaced, displacedMesh(surface, *asset.heights, figures_.offset));
-        VCP_TRY_ASSIGN(figures_.scanToBase, distances(scan_.mesh, displaced, kMeasuring));
-        VCP_TRY_ASSIGN(figures_.baseToScan, distances(displaced, scan_.mesh, kMeasuringBack));
+        VCP_TRY_ASSIGN(const LoadedSurface scan, readScan(kReadingAgain));
+        VCP_TRY_ASSIGN(figures_.scanToBase, distances(scan.mesh, displaced, kMeasuring));
+        VCP_TRY_ASSIGN(figures_.baseToScan, distances(displaced, scan.mesh, kMeasuringBack));
         return {};
     }
 
@@ -178,7 +222,6 @@ private:
     const Dataset& dataset_;
     const std::filesystem::path& folder_;
     const BakeOptions& options_;
-    LoadedSurface scan_;
     BaseSurface base_;
     BakeFigures figures_;
 };

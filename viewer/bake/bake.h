@@ -24,6 +24,9 @@ struct BakeOptions {
     double reach = 0;                 ///< world units, as BakeMapsOptions; 0: chosen (see BakeFigures)
     bool withColour = true;
     bool measured = false;  ///< distances between scan and displaced base; both are held in memory
+    /// Triangles of a scan that is decimated at once; a larger one is made coarser first (coarsened_scan.h), as is one
+    /// that does not fit the memory by 800 bytes a triangle.
+    uint64_t mostDecimated = 20'000'000;
     uint64_t memoryBytes = uint64_t{4} << 30;
     /// Takes what is done and the part of the whole; returning false cancels. May be empty.
     std::function<bool(std::string_view stage, double fraction)> progress = {};
@@ -31,7 +34,8 @@ struct BakeOptions {
 
 struct BakeFigures {
     uint64_t scanTriangles = 0, baseTriangles = 0;
-    uint64_t scanVertices = 0;  ///< where the scan is decimated
+    uint64_t scanVertices = 0;     ///< where the scan is decimated
+    uint64_t coarseTriangles = 0;  ///< that a scan was made coarser to before it was decimated; 0: it was not
     /// Triangles without which a decimated base is made, of the scan or its own: a third one on an edge, or at a corner
     /// whose normals cancel.
     uint64_t leftOut = 0;
@@ -46,12 +50,9 @@ struct BakeFigures {
     std::optional<Quantiles> scanToBase, baseToScan;  ///< where measured: sizes of distances, world units
 };
 
-/// Decimation takes at most so many triangles of a scan, and that much memory for each.
-inline constexpr uint64_t kMostDecimated = 20'000'000, kDecimationBytes = 800;
-
 /// Bakes, and writes the files of bake_files.h into `folder`. `dataset`: its directory is known as a whole. Errors:
-/// Unsupported (the paper's method); those of the readers of meshes, givenMap, makeAtlas, decimated, bakeMaps and
-/// writeBaked; Limit (the scan is too large to be decimated); Cancelled.
+/// Unsupported (the paper's method); those of the readers of meshes, givenMap, makeAtlas, coarsenScan, decimated,
+/// bakeMaps and writeBaked; Limit (the memory, for the base or for measuring); Cancelled.
 Result<BakeFigures> bake(const std::shared_ptr<const ByteReader>& reader, const Dataset& dataset,
                          const std::filesystem::path& folder, const BakeOptions& options);
 

@@ -71,7 +71,8 @@ private:
         const DeviationTarget target(mesh);
         VCP_TRY_ASSIGN(const auto away,
                        measureDeviation(scan_, target, {.samples = kForReach, .progress = progress(0.6, 0.7)}));
-        made.reach = std::max(1.5 * away.absoluteQuantile(1), 4 * dataset_.cellOf(dataset_.header.levels - 1));
+        made.reach = std::max(1.5 * (away.absoluteQuantile(1) + options_.scanAway),
+                              4 * dataset_.cellOf(dataset_.header.levels - 1));
         return made;
     }
 

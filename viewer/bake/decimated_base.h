@@ -15,8 +15,9 @@ namespace vcp {
 
 struct DecimatedBaseOptions {
     size_t triangles = 10'000;
-    int texels = 1024;  ///< an edge of the maps
-    double reach = 0;   ///< as BakeOptions
+    int texels = 1024;    ///< an edge of the maps
+    double reach = 0;     ///< as BakeOptions
+    double scanAway = 0;  ///< how far the mesh that is decimated is from the scan, world units
     uint64_t memoryBytes = uint64_t{4} << 30;
     std::function<bool(double)> progress = {};  ///< takes the part done; false cancels
 };
@@ -34,8 +35,8 @@ struct DecimatedBase {
 
 /// Decimates a scan, looks by small maps where it is no height field over the base, and decimates it anew with what
 /// lies there counting more, up to three times and as long as that helps. The base has as many triangles in each round.
-/// `dataset`: as bakeMaps; `scan`: its finest level. Errors: those of decimated, makeAtlas and bakeMaps; InvalidInput
-/// (nothing is left of it).
+/// `dataset`: as bakeMaps; `scan`: its finest level, or that coarsened. Errors: those of decimated, makeAtlas and
+/// bakeMaps; InvalidInput (nothing is left of it).
 Result<DecimatedBase> decimateToFollow(const std::shared_ptr<const ByteReader>& reader, const Dataset& dataset,
                                        const IndexedMesh& scan, const DecimatedBaseOptions& options);
 

@@ -41,6 +41,7 @@ Json toJson(const BakeMeso& command, const BakeFigures& f, uint64_t scanBytes, d
                  {"triangles_of_scan", f.scanTriangles},
                  {"triangles", f.baseTriangles},
                  {"left_out", f.leftOut},
+                 {"triangles_coarsened", f.coarseTriangles},
                  {"texels", command.options.texels},
                  {"map", f.isAtlas ? "atlas" : "given"},
                  {"reach", f.reach},
@@ -74,6 +75,8 @@ std::string summary(const BakeMeso& command, const BakeFigures& f, uint64_t scan
         command.out, formatCount(f.baseTriangles), formatCount(f.scanTriangles), n, n, formatBytes(f.bytes),
         formatBytes(scanBytes), mesh, formatLength(f.offset), formatLength(f.offset + f.range), formatLength(f.reach),
         100 * f.shares.height, 100 * f.shares.noHit, 100 * f.shares.sheets, 100 * f.shares.steep);
+    if (f.coarseTriangles > 0)
+        text += fmt::format("\n  the scan was made coarser first, to {} triangles", formatCount(f.coarseTriangles));
     if (f.unlikeAtFirst > f.unlike)
         text += fmt::format(
             "\n  the base was made to follow the scan: by small maps, it was none over {:.2f} %, now {:.2f} %",

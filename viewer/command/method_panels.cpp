@@ -9,9 +9,9 @@
 
 namespace vcp {
 
-Result<MesoScene> surfacesBy(const std::string& method, SceneFile scene) {
+Result<MesoScene> surfacesBy(const std::string& method, SceneFile scene, const SurfaceProgress& progress) {
     SurfaceChoices{.method = method, .subdivide = {}}.applyTo(scene);
-    return makeMesoScene(scene.surfaces);
+    return makeMesoScene(scene.surfaces, progress);
 }
 
 Result<MethodPanel> readPanel(PictureRenderer& renderer, const std::string& method, bool withIterations,

@@ -21,7 +21,7 @@ struct MethodPanel {
 };
 
 /// Makes the surfaces of a scene as if it named `method` for each. Errors: those of makeMesoScene.
-Result<MesoScene> surfacesBy(const std::string& method, SceneFile scene);
+Result<MesoScene> surfacesBy(const std::string& method, SceneFile scene, const SurfaceProgress& progress);
 
 /// Reads back what was drawn last. Errors: those of the renderer.
 Result<MethodPanel> readPanel(PictureRenderer& renderer, const std::string& method, bool withIterations,

@@ -234,7 +234,12 @@ Result<Json> drawOne(PictureRenderer& renderer, const FrameRequest& request, con
     std::vector<MethodPanel> panels;
     for (const std::string& method : methods) {
         if (first) {
-            VCP_TRY_ASSIGN(auto surfaces, surfacesBy(method, scene));
+            ProgressDisplay display(command.report.progressStyle(), stderr);
+            VCP_TRY_ASSIGN(auto surfaces, surfacesBy(method, scene, [&](const char* stage, double part) {
+                               display.update(stage, part);
+                               return !interrupted();
+                           }));
+            display.finish();
             reportMeasuring(surfaces.surfaces, command.report.progressStyle());
             VCP_TRY(renderer.setSurfaces(surfaces.surfaces));
         }

@@ -10,7 +10,7 @@
 
 #include "mesostructure/base/subdivision.h"
 #include "mesostructure/base/surface_edges.h"
-#include "mesostructure/remesh/remesher.h"
+#include "mesostructure/remesh/certified_cells.h"
 #include "mesostructure/solids.h"
 #include "viewer/asset/height_image.h"
 #include "viewer/asset/share_out.h"
@@ -106,7 +106,7 @@ class Remeshing {
 public:
     /// Takes the asset's heights.
     Result<MesoSurface> make(const MesoSurfaceDescription& d, Asset& asset, const BaseSurface& base,
-                             std::vector<std::string>& warnings) {
+                             std::vector<std::string>& warnings, const SurfaceProgress& progress) {
         if (!asset.heights)
             return Error{.code = ErrorCode::Usage,
                          .message = fmt::format("{} is for height fields; {} is a solid", kRemeshMethod, asset.name)};
@@ -139,6 +139,13 @@ public:
                              .shareOut = [](size_t count, const std::function<void(size_t first, size_t last)>& fill) {
                                  return shareOut(count, fill, {});
                              }}};
+        if (d.errorPixels > 0) {
+            auto cells = CertifiedCells::create(*surface.remeshed.surface, [&](double part) {
+                return !progress || progress("cutting the surface", part);
+            });
+            if (!cells) return cells.error();
+            surface.remeshed.cells = std::make_shared<CertifiedCells>(*std::move(cells));
+        }
         surface.withBase = d.withBase;
         if (!d.withLightRays) return surface;
         auto shell =
@@ -325,7 +332,7 @@ Result<MesoScene> makeMesoScene(std::span<const MesoSurfaceDescription> descript
         if (!transfer) return d.from.blamed(transfer.error());
         VCP_TRY(bases.add(d, *asset, *base, *transfer));
         if (d.method.name == kRemeshMethod) {
-            auto surface = remeshing.make(d, *asset, *base, scene.warnings);
+            auto surface = remeshing.make(d, *asset, *base, scene.warnings, progress);
             if (!surface) return d.from.blamed(surface.error());
             VCP_TRY_ASSIGN(surface->colours, textures.colours(d.colourTexture));
             VCP_TRY_ASSIGN(surface->normals, textures.normals(d.normalTexture));

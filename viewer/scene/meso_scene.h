@@ -102,7 +102,8 @@ std::vector<glm::dvec3> surfacesMovedAt(std::span<const SurfacePath> paths, doub
 using SurfaceProgress = std::function<bool(const char* stage, double part)>;
 
 /// Makes the surfaces. Errors: those of the assets, methods, bases and shells, with the file where there is one;
-/// Cancelled, between two surfaces and while a displacement map or light between their bases is traced.
+/// Cancelled, between two surfaces, while a displacement map or light between their bases is traced, and while a
+/// remeshed surface is cut.
 Result<MesoScene> makeMesoScene(std::span<const MesoSurfaceDescription> descriptions,
                                 const SurfaceProgress& progress = {});
 

@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include "mesostructure/base/manifold_part.h"
 #include "tests/mesostructure/base/surfaces.h"
 
 namespace vcp::meso {
@@ -98,8 +99,46 @@ TEST(SurfaceEdges, TrianglesWithEqualCornersAreLeftOut) {
     EXPECT_EQ(edges({{{0, 0, 0}}, {{0, 0, 0}}, {}}).triangles, 0u);
 }
 
+TEST(SurfaceEdges, FindTheirOtherSides) {
+    // A torus with a hole, against a search.
+    const BaseSurface torus = shape("torus");
+    auto triangles = torus.triangles;
+    triangles.erase(triangles.begin() + 5, triangles.begin() + 9);
+    const std::vector<uint32_t> opposite = oppositeEdges(triangles, torus.positions.size());
+    ASSERT_EQ(opposite.size(), 3 * triangles.size());
+    std::map<std::pair<uint32_t, uint32_t>, uint32_t> numbers;
+    for (uint32_t e = 0; e < opposite.size(); ++e)
+        numbers[{triangles[e / 3][e % 3], triangles[e / 3][(e + 1) % 3]}] = e;
+    size_t open = 0;
+    for (const auto& [ends, edge] : numbers) {
+        const auto found = numbers.find({ends.second, ends.first});
+        ASSERT_EQ(opposite[edge], found == numbers.end() ? kNoEdge : found->second) << edge;
+        open += found == numbers.end();
+    }
+    EXPECT_GT(open, 3u);
+}
+
+TEST(SurfaceEdges, FoldsAreLeftOut) {
+    // Two triangles back to back on an edge of a tetrahedron, and a third one that is no fold.
+    BaseSurface surface = tetrahedron();
+    const BaseSurface whole = surface;
+    surface.positions.push_back({5, 5, 5});
+    surface.triangles.insert(surface.triangles.begin() + 1, {0, 1, 4});
+    surface.triangles.push_back({4, 1, 0});
+    EXPECT_EQ(leaveOutFolds(surface), 2u);
+    EXPECT_EQ(surface.triangles, whole.triangles);
+    EXPECT_EQ(leaveOutFolds(surface), 0u);
+    // Of two on one side and one on the other, one stays.
+    surface.triangles = {{0, 1, 2}, {2, 1, 0}, {1, 2, 0}};
+    EXPECT_EQ(leaveOutFolds(surface), 2u);
+    EXPECT_EQ(surface.triangles, (std::vector<std::array<uint32_t, 3>>{{1, 2, 0}}));
+}
+
 TEST(SurfaceEdges, AFanOfAMillionTakesNoLongerThanItsTriangles) {
-    EXPECT_EQ(edges(doubleCone(500'000)).all, 1'500'000u);
+    const BaseSurface cone = doubleCone(500'000);
+    EXPECT_EQ(edges(cone).all, 1'500'000u);
+    const std::vector<uint32_t> opposite = oppositeEdges(cone.triangles, cone.positions.size());
+    for (uint32_t e = 0; e < opposite.size(); ++e) ASSERT_EQ(opposite[opposite[e]], e);
 }
 
 TEST(JoinPositions, NumbersInTheOrderInWhichPlacesFirstCome) {

@@ -329,6 +329,31 @@ TEST(CertifiedCells, DistantViewsLookAtFewTexels) {
     EXPECT_LT(four.looked, uint64_t{16} * 512 * 512 / 4);
 }
 
+/// `blocks` with many tiles has too many small patches, so that it is cut a second time.
+TEST(CertifiedCells, CuttingTellsHowFarItIsAndIsCancelled) {
+    for (const double tiles : {1.0, 6.0}) {
+        const RemeshSurface surface = surfaceOf("quad", tiles, 0.2, "blocks", 256);
+        std::vector<double> told;
+        const auto all = CertifiedCells::create(surface, [&](double part) {
+            told.push_back(part);
+            return true;
+        });
+        ASSERT_TRUE(all);
+        EXPECT_GE(told.size(), 8u);
+        EXPECT_TRUE(std::ranges::is_sorted(told));
+        EXPECT_GE(told.front(), 0);
+        EXPECT_EQ(told.back(), 1);
+        EXPECT_TRUE(std::ranges::any_of(told, [](double part) { return part > 0.2 && part < 0.5; }));
+        for (const size_t most : {size_t{1}, told.size() / 2, told.size()}) {
+            size_t calls = 0;
+            const auto cancelled = CertifiedCells::create(surface, [&](double) { return ++calls < most; });
+            ASSERT_FALSE(cancelled);
+            EXPECT_EQ(cancelled.error().code, ErrorCode::Cancelled);
+            EXPECT_EQ(calls, most);
+        }
+    }
+}
+
 TEST(CertifiedCells, RefuseWhatTheyCannotCut) {
     BaseSurface base{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}, {{dvec2(0), dvec2(1e12, 0), dvec2(0, 1e12)}}};
     auto levels = std::make_shared<HeightLevels>(*HeightLevels::build(*makeHeightField("fbm", 16, 1)));

@@ -9,9 +9,11 @@
 #include <glm/geometric.hpp>
 
 #include "mesostructure/asset_file.h"
+#include "mesostructure/base/surface_edges.h"
 #include "mesostructure/shell.h"
 #include "octree/io/byte_reader.h"
 #include "tests/support/built_mesh.h"
+#include "viewer/bake/coarsened_scan.h"
 #include "viewer/bake/displaced_mesh.h"
 #include "viewer/scene/base_mesh.h"
 
@@ -328,6 +330,64 @@ TEST(Bake, ABaseFollowsWhatWouldBeNoHeightField) {
     EXPECT_LT(1 - figures->shares.height, 0.5 * figures->unlikeAtFirst);
     EXPECT_TRUE(std::ranges::is_sorted(told));
     EXPECT_EQ(figures->scanVertices, mushroom().positions.size());
+}
+
+TEST(Bake, ALargeScanIsMadeCoarserFirst) {
+    const IndexedMesh sphere = bumpySphere(70);
+    const test::BuiltMesh scan(sphere, 1.0 / 16);
+    ASSERT_TRUE(scan.ok());
+    const std::shared_ptr<const ByteReader> reader = *openFile(scan.file());
+    const Dataset& dataset = scan.cache().dataset();
+    const SurfaceCut cut = *SurfaceCut::create(dataset, reader->name(), UINT32_MAX);
+    BaseSurface joined{sphere.positions, sphere.triangles, {}};
+    joinPositions(joined);
+    // Half a step of the lattice along each axis, of 2048 a cell.
+    const double rounded = 1.05 * std::sqrt(3) / 2 / 16 / 2048;
+    // There are several runs; then one is the whole.
+    for (const uint64_t memory : {uint64_t{16} << 20, uint64_t{1} << 32}) {
+        std::vector<double> told;
+        CoarseningOptions options{.triangles = 3000, .memoryBytes = memory, .progress = [&](double part) {
+                                      told.push_back(part);
+                                      return true;
+                                  }};
+        const auto coarse = coarsenScan(*reader, cut, options);
+        ASSERT_TRUE(coarse) << coarse.error().line();
+        EXPECT_NEAR(double(coarse->mesh.triangles.size()), 3000, 1000);
+        EXPECT_EQ(coarse->vertices, joined.positions.size());
+        EXPECT_LE(coarse->leftOut, 8u);
+        const BaseSurface surface{coarse->mesh.positions, coarse->mesh.triangles, {}};
+        const auto edges = edgesOf(surface);
+        ASSERT_TRUE(edges) << edges.error().line();
+        EXPECT_LE(edges->border, 3 * coarse->leftOut);
+        EXPECT_EQ(edges->parts, 1u);
+        // Corners are the scan's, and what lies between them is as near as is said, but for samples.
+        for (const dvec3& p : surface.positions) EXPECT_LT(offFormula(p), rounded);
+        EXPECT_GT(coarse->away, 0);
+        EXPECT_LT(coarse->away, 1e-2);
+        EXPECT_LT(facetsOff(coarse->mesh), facetsOff(sphere) + 2 * coarse->away);
+        EXPECT_TRUE(std::ranges::is_sorted(told));
+        EXPECT_FALSE(told.empty());
+        options.progress = [](double) { return false; };
+        EXPECT_EQ(coarsenScan(*reader, cut, options).error().code, ErrorCode::Cancelled);
+    }
+    const auto refused = coarsenScan(*reader, cut, {.triangles = 3000, .memoryBytes = 1 << 16});
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().code, ErrorCode::Limit);
+
+    const TestFolder folder("vcp_bake_test");
+    BakeOptions options{.triangles = 300, .texels = 384, .measured = true, .mostDecimated = 3000};
+    const auto figures = bake(reader, dataset, folder.path(), options);
+    ASSERT_TRUE(figures) << figures.error().line();
+    EXPECT_NEAR(double(figures->coarseTriangles), 3000, 1000);
+    EXPECT_EQ(figures->scanVertices, joined.positions.size());
+    EXPECT_LE(figures->baseTriangles, 300u);
+    EXPECT_EQ(figures->shares.height, 1);
+    EXPECT_LT(figures->scanToBase->max, 8e-3);
+    options.mostDecimated = 500;
+    const auto few = bake(reader, dataset, folder.path(), options);
+    ASSERT_FALSE(few);
+    EXPECT_EQ(few.error().code, ErrorCode::Limit);
+    EXPECT_NE(few.error().message.find("a base of 300 of them"), std::string::npos) << few.error().line();
 }
 
 TEST(Bake, WhatIsWrittenIsTheScan) {

@@ -280,6 +280,12 @@ TEST(SceneFile, SurfacesMayBeRemeshed) {
     EXPECT_TRUE(made->surfaces[0].arrays) << "it casts shadows";
     EXPECT_GT(made->surfaces[0].lift, 0);
     EXPECT_TRUE(made->warnings.empty());
+    ASSERT_TRUE(made->surfaces[0].remeshed.cells) << "an error is certified";
+    EXPECT_FALSE(makeMesoScene(sceneOf(R"(, "error": 0)")->surfaces)->surfaces[0].remeshed.cells);
+    const auto stopped =
+        makeMesoScene(scene->surfaces, [](std::string_view stage, double) { return stage != "cutting the surface"; });
+    ASSERT_FALSE(stopped);
+    EXPECT_EQ(stopped.error().code, ErrorCode::Cancelled);
     SceneFile unshaded = *scene;
     SurfaceChoices{.method = {}, .subdivide = {}, .withLightRays = false}.applyTo(unshaded);
     const auto lean = makeMesoScene(unshaded.surfaces);
