@@ -99,20 +99,23 @@ void writeMap(const GdmMap& map, Out& o) {
     o.all(map.properties.texels);
 }
 
-/// Reads a displacement map of a whole slab. Sizes follow from its counts, and are those of the chunk.
-void readMap(In& in, glm::dvec3 extent, GdmMap& map) {
+/// Reads a displacement map: of a whole slab, or from the top alone, where `map` has its curvatures and `layers` is
+/// what its properties have along z. Sizes follow from its counts, and are those of the chunk.
+void readMap(In& in, glm::dvec3 extent, int layers, GdmMap& map) {
+    const bool isOfTop = layers > 0;
     const auto points = in.one<glm::ivec3>();
     DirectionGrid directions;
-    directions.thetas = in.one<int>(), directions.phis = in.one<int>();
+    directions.thetas = in.one<int>(), directions.phis = in.one<int>(), directions.downwards = isOfTop;
     const auto unit = in.one<float>();
     const auto rank = in.one<uint32_t>(), bits = in.one<uint32_t>(), withVisibility = in.one<uint32_t>();
     const auto factorUnit = in.one<float>();
-    for (int axis = 0; axis < 3; ++axis) in.require(points[axis] >= 2 && points[axis] <= kMostNodes);
+    for (int axis = 0; axis < 2; ++axis) in.require(points[axis] >= 2 && points[axis] <= kMostNodes);
+    in.require(isOfTop ? points.z == 1 : points.z >= 2 && points.z <= kMostNodes);
     in.require(directions.thetas >= 2 && directions.thetas <= 64 && directions.phis >= 4 && directions.phis <= 64);
     in.require(unit > 0 && unit <= 1 && std::abs(factorUnit) <= 1);
     in.require(rank <= uint32_t(kMostRank) && rank % 4 == 0 && (bits == 8 || bits == 16) && withVisibility <= 1);
     if (!in.ok()) return;
-    map.table = DistanceTable{points, directions, extent, unit, {}, {}};
+    map.table = DistanceTable{points, directions, map.table.curvatures, extent, unit, {}, {}};
     map.bits = int(bits), map.withVisibility = withVisibility == 1;
     const uint64_t rows = map.table.rows(), columns = map.table.columns(), words = uint64_t(rank / 4) * (bits / 8);
     if (rank == 0) {
@@ -122,7 +125,28 @@ void readMap(In& in, glm::dvec3 extent, GdmMap& map) {
         map.factors->weights = in.all<uint32_t>(rows * words), map.factors->eigen = in.all<uint32_t>(columns * words);
     }
     if (map.withVisibility) map.table.hits = in.all<uint32_t>(rows * map.table.hitWords());
-    map.properties = {points, extent, in.all<uint32_t>(uint64_t(points.x) * uint64_t(points.y) * uint64_t(points.z))};
+    const glm::ivec3 volume(points.x, points.y, isOfTop ? layers : points.z);
+    map.properties = {volume, extent, in.all<uint32_t>(uint64_t(volume.x) * uint64_t(volume.y) * uint64_t(volume.z))};
+}
+
+constexpr uint32_t kViewDependentVersion = 1;
+
+void writeViewDependent(const GdmMap& map, Out& o) {
+    o.one(kViewDependentVersion), o.one(map.table.curvatures.samples), o.one(map.table.curvatures.most);
+    o.one(map.properties.points.z);
+    writeMap(map, o);
+}
+
+void readViewDependent(In& in, glm::dvec3 extent, GdmMap& map) {
+    const auto version = in.one<uint32_t>();
+    Curvatures& curvatures = map.table.curvatures;
+    curvatures.samples = in.one<int>(), curvatures.most = in.one<double>();
+    const auto layers = in.one<int>();
+    in.require(version == kViewDependentVersion);
+    in.require(curvatures.samples >= 1 && curvatures.samples <= kMostCurvatureSamples && curvatures.samples % 2 == 1);
+    in.require(curvatures.samples == 1 || (curvatures.most > 0 && curvatures.most <= kMostCurvature));
+    in.require(layers >= 2 && layers <= kMostNodes);
+    if (in.ok()) readMap(in, extent, layers, map);
 }
 
 void readGuesses(In& in, SafeFactors& f) {
@@ -206,6 +230,7 @@ std::vector<std::pair<ChunkKind, Bytes>> chunksOf(const Asset& a) {
             o.one(kNormalsVersion), o.one(uint32_t(a.patches->normals.size())), o.all(a.patches->normals);
         });
     if (a.gdm) add(ChunkKind::Displacement, [&](Out& o) { writeMap(*a.gdm, o); });
+    if (a.vdm) add(ChunkKind::ViewDependent, [&](Out& o) { writeViewDependent(*a.vdm, o); });
     if (a.guesses)
         add(ChunkKind::Guesses, [&](Out& o) {
             const SafeFactors& f = *a.guesses;
@@ -316,7 +341,10 @@ bool readChunk(ChunkKind kind, In& in, Asset& a) {
             break;
         }
         case ChunkKind::Displacement:
-            readMap(in, extent, a.gdm.emplace());
+            readMap(in, extent, 0, a.gdm.emplace());
+            break;
+        case ChunkKind::ViewDependent:
+            readViewDependent(in, extent, a.vdm.emplace());
             break;
         case ChunkKind::Guesses:
             readGuesses(in, a.guesses.emplace());
@@ -357,6 +385,12 @@ bool belongTogether(Asset& a) {
     if (!compressed) return false;
     a.compressed = *std::move(compressed);
     return true;
+}
+
+Result<GdmMap> mapOf(const Asset& asset, const Shape& shape, const AssetOptions::Displacement& options) {
+    VCP_TRY_ASSIGN(auto table, traceTable(asset, shape, options.traced));
+    VCP_TRY_ASSIGN(auto properties, sampleProperties(shape, options.traced.points));
+    return packMap(std::move(table), options.rank, options.bits, options.withVisibility, std::move(properties));
 }
 
 }  // namespace
@@ -409,10 +443,12 @@ Result<void> buildAsset(Asset& asset, const AssetOptions& options) {
         VCP_TRY_ASSIGN(asset.guesses, buildGuesses(*asset.occupancy, options.guesses));
     }
     if (options.gdm) {
-        VCP_TRY_ASSIGN(auto table, traceTable(asset, *shape, options.gdm->traced));
-        VCP_TRY_ASSIGN(auto properties, sampleProperties(*shape, options.gdm->traced.points));
-        VCP_TRY_ASSIGN(asset.gdm, packMap(std::move(table), options.gdm->rank, options.gdm->bits,
-                                          options.gdm->withVisibility, std::move(properties)));
+        VCP_TRY_ASSIGN(asset.gdm, mapOf(asset, *shape, *options.gdm));
+    }
+    if (options.vdm) {
+        AssetOptions::Displacement map = *options.vdm;
+        map.traced.ofTop = true;
+        VCP_TRY_ASSIGN(asset.vdm, mapOf(asset, *shape, map));
     }
     if (options.transfer) {
         VCP_TRY_ASSIGN(auto transfer, traceTransfer(*shape, *options.transfer));
@@ -536,7 +572,7 @@ Result<Asset> parseAsset(std::span<const std::byte> bytes, const std::string& na
         if (hashBytes(content) != chunk.hash)
             return fail("chunk", chunk.offset, "hash does not match: the file was changed or damaged");
         const auto kind = uint32_t(chunk.kind);
-        if (kind >= 64 || kind == 0 || kind > uint32_t(ChunkKind::Normals))
+        if (kind >= 64 || kind == 0 || kind > uint32_t(ChunkKind::ViewDependent))
             return Error{.code = ErrorCode::Unsupported,
                          .message = fmt::format("chunk kind {} is not known: use a newer program", kind),
                          .file = name,

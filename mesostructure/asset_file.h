@@ -48,6 +48,9 @@ enum class ChunkKind : uint32_t {
     Transfer = 12,
     /// PatchSet::normals, behind the patches: u32 version (1), u32 number of patches, 4 x u32 a patch
     Normals = 13,
+    /// GdmMap of the top alone: u32 version (1), i32 samples of curvature, f64 the greatest, i32 points of the
+    /// properties along z; the rest as Displacement, with one point along z
+    ViewDependent = 14,
 };
 
 struct AssetHeader {
@@ -98,7 +101,7 @@ struct Asset {
     std::optional<CompressedMap> compressed;
     std::optional<OctantBoxes> boxes;
     std::optional<PatchSet> patches;
-    std::optional<GdmMap> gdm;
+    std::optional<GdmMap> gdm, vdm;  ///< the latter of the top alone
     std::optional<SafeFactors> guesses;
     std::shared_ptr<const TransferVolume> transfer;  ///< null: none
 };
@@ -124,6 +127,7 @@ struct AssetOptions {
         bool withVisibility = true;
     };
     std::optional<Displacement> gdm = std::nullopt;
+    std::optional<Displacement> vdm = std::nullopt;  ///< of the top alone; `ofTop` is not read
     std::optional<TransferOptions> transfer = std::nullopt;
 };
 

@@ -49,14 +49,14 @@ Result<DistanceTable> traceTable(const Asset& asset, const Shape& shape, const G
     glm::ivec3 points = options.points;
     if (options.ofTop) points.z = 1;
     VCP_TRY_ASSIGN(auto table, emptyTable(points, {options.directions.x, options.directions.y, options.ofTop},
-                                          shape.extent(), options.memoryBytes));
+                                          options.curvatures, shape.extent(), options.memoryBytes));
     if (!options.ofTop && points.z < 2)
         return Error{.code = ErrorCode::Usage, .message = "a map of a volume has at least 2 points along z"};
     VCP_TRY_ASSIGN(const auto method, buildMethod(asset, shape, {.name = "boxes", .cells = gridFor(asset, {}).x}));
     VCP_TRY_ASSIGN(const auto marcher, method.marcher());
     const TracedSolid solid{[&](glm::dvec3 p) { return shape.field(p) <= 0; },
-                            [&](glm::dvec3 p, glm::dvec3 d) -> std::optional<double> {
-                                const MarchResult found = marcher->march({p, d});
+                            [&](glm::dvec3 p, glm::dvec3 d, double reach) -> std::optional<double> {
+                                const MarchResult found = marcher->march({p, d, reach});
                                 if (found.state != MarchState::Hit) return std::nullopt;
                                 return found.t;
                             }};

@@ -34,6 +34,7 @@ struct GdmOptions {
     glm::ivec3 points{32, 32, 16};  ///< of a map of the top alone, z is not read
     glm::ivec2 directions{16, 32};  ///< thetas, phis
     bool ofTop = false;             ///< a view-dependent displacement map
+    Curvatures curvatures = {};     ///< of such a map
     uint64_t memoryBytes = uint64_t{1} << 30;
     /// Calls `fill(first, last)` for all of [0, count), in ranges that may run in several threads at once; false
     /// cancels. Empty: in this thread.

@@ -34,6 +34,10 @@ struct MarchRay {
     glm::dvec3 origin{0};     ///< in the slab; any tile
     glm::dvec3 direction{0};  ///< unit vector
     double tMax = 1e6;        ///< tile units
+    /// How much a ray along the slab would bend upwards at the origin, in the direction of this one, over a base that
+    /// bends: the second derivative of its height over its way along the tile. View-dependent maps with curvatures read
+    /// it; to others rays are straight.
+    double bend = 0;
 };
 
 enum class MarchState : uint8_t { Hit, Miss, Unresolved };

@@ -247,12 +247,15 @@ Result<MarchArrays> gdmArrays(const GdmMap& map) {
     const DistanceTable& table = map.table;
     arrays.constants = {.walk = table.isOfTop() ? kMesoVdm : kMesoGdm,
                         .skip = map.factors ? kMesoFactored : kMesoTable,
-                        .surface = map.withVisibility ? kMesoVisibilityBit : kMesoDensity};
+                        .surface = map.withVisibility ? kMesoVisibilityBit : kMesoDensity,
+                        .refinement = table.curvatures.samples > 1 ? kMesoBent : kMesoStraight};
     addProperties(map.properties, arrays);
     record.fine = table.nodes;
     record.elevations = table.directions.thetas, record.azimuths = table.directions.phis;
     record.cellCount = int(table.rows()), record.columnCount = int(table.columns());
     record.valueBits = map.bits;
+    record.curvatures = table.curvatures.samples;
+    record.mostCurvature = float(table.curvatures.most / table.extent.z);
     if (map.factors) {
         record.levelCount = map.factors->rank / 4;
         record.step = map.factors->unit;
@@ -278,8 +281,12 @@ MarchArrays slicesArrays(const PropertyVolume& volume) {
 }
 
 f32::MesoRay rayInTile(const MarchRay& ray, const MarchArrays& arrays) {
-    return {glm::vec3(inFirstTile(ray.origin, arrays.extent)), glm::vec3(ray.direction),
-            std::min(float(ray.tMax), kMostReach), float(ray.origin.z) >= arrays.record.extent.z, false};
+    return {glm::vec3(inFirstTile(ray.origin, arrays.extent)),
+            glm::vec3(ray.direction),
+            std::min(float(ray.tMax), kMostReach),
+            float(ray.origin.z) >= arrays.record.extent.z,
+            false,
+            float(ray.bend)};
 }
 
 std::unique_ptr<Marcher> arrayMarcher(MarchArrays arrays, uint64_t bytes, bool isConservative) {

@@ -11,6 +11,7 @@
 #include <glm/exponential.hpp>
 #include <glm/geometric.hpp>
 #include <glm/integer.hpp>
+#include <glm/trigonometric.hpp>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
@@ -41,10 +42,12 @@ inline float floor(float x) {
 inline glm::vec3 floor(glm::vec3 v) { return {floor(v.x), floor(v.y), floor(v.z)}; }
 
 #include "mesostructure/shared/march_layout.h"
-static_assert(sizeof(MesoRecord) == 176 + 16 * (kMesoMaxLevels + kMesoMostBorders) &&
-              offsetof(MesoRecord, levels) == 176);
+static_assert(sizeof(MesoRecord) == 192 + 16 * (kMesoMaxLevels + kMesoMostBorders) &&
+              offsetof(MesoRecord, levels) == 192);
 
 #include "mesostructure/shared/shell_layout.h"
+
+#include "mesostructure/gdm/bent_path.h"
 
 #define REAL_EPSILON 1.1920929e-7
 #include "mesostructure/shared/cell_solve.h"

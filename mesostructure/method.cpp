@@ -81,15 +81,23 @@ glm::ivec3 pointsOf(glm::dvec3 extent, const MethodOptions& options) {
     return {n, std::max(2, int(std::lround(n * extent.y))), layers};
 }
 
+/// Whether bits say what is hit. Over bases that bend, rays that leave by the top again are what silhouettes are.
+bool hasVisibility(const MethodOptions& options, Curvatures curvatures) {
+    return options.name == "gdm-visibility" || curvatures.samples > 1;
+}
+
 /// Returns the asset's map where it is what is asked for; any map of the asset's where no size is.
 const GdmMap* storedMap(const Asset& asset, const GdmOptions& traced, const MethodOptions& options) {
-    if (!asset.gdm || traced.ofTop || options.table != nullptr) return nullptr;
-    const GdmMap& map = *asset.gdm;
-    const bool isThere = map.withVisibility || options.name != "gdm-visibility";
+    const std::optional<GdmMap>& stored = traced.ofTop ? asset.vdm : asset.gdm;
+    if (!stored || options.table != nullptr) return nullptr;
+    const GdmMap& map = *stored;
+    const bool isThere = map.withVisibility || !hasVisibility(options, map.table.curvatures);
     const int rank = map.factors ? map.factors->rank : 0;
     const glm::ivec2 directions(map.table.directions.thetas, map.table.directions.phis);
-    const bool isAlike = map.table.nodes == traced.points && directions == traced.directions &&
-                         rank == (options.rank + 3) / 4 * 4 && map.bits == options.bits;
+    const glm::ivec3 points = {traced.points.x, traced.points.y, traced.ofTop ? 1 : traced.points.z};
+    const bool isAlike = map.table.nodes == points && directions == traced.directions &&
+                         map.table.curvatures == traced.curvatures && rank == (options.rank + 3) / 4 * 4 &&
+                         map.bits == options.bits;
     return isThere && (isAlike || (options.cells == 0 && options.layers == 0)) ? &map : nullptr;
 }
 
@@ -102,7 +110,7 @@ Result<Method> displacementMethod(const Asset& asset, const Shape& shape, const 
     const GdmOptions traced = tracedBy(shape, options);
     if (const GdmMap* stored = storedMap(asset, traced, options)) {
         method.gdm = std::make_unique<GdmMap>(*stored);
-        method.gdm->withVisibility = options.name == "gdm-visibility";
+        method.gdm->withVisibility = hasVisibility(options, stored->table.curvatures);
         return method;
     }
     VCP_TRY_ASSIGN(auto properties, sampleProperties(shape, traced.points));
@@ -112,9 +120,9 @@ Result<Method> displacementMethod(const Asset& asset, const Shape& shape, const 
     } else {
         VCP_TRY_ASSIGN(table, traceTable(asset, shape, traced));
     }
-    VCP_TRY(take(
-        packMap(std::move(table), options.rank, options.bits, options.name == "gdm-visibility", std::move(properties)),
-        method.gdm));
+    VCP_TRY(take(packMap(std::move(table), options.rank, options.bits, hasVisibility(options, traced.curvatures),
+                         std::move(properties)),
+                 method.gdm));
     return method;
 }
 
@@ -182,6 +190,7 @@ GdmOptions tracedBy(const Shape& shape, const MethodOptions& options) {
     GdmOptions traced;
     traced.points = pointsOf(shape.extent(), options), traced.directions = options.directions;
     traced.ofTop = options.name == "vdm", traced.shareOut = options.shareOut;
+    if (traced.ofTop) traced.curvatures = options.curvatures;
     return traced;
 }
 

@@ -56,6 +56,7 @@ struct MethodOptions {
     int rank = 16;                  ///< terms of gdm, gdm-visibility and vdm; 0: the table itself
     int bits = 16;                  ///< of their values: 8 or 16
     glm::ivec2 directions{16, 32};  ///< theirs: elevations over the sphere (vdm: over its lower half), azimuths
+    Curvatures curvatures{5, 0.5};  ///< of the base, of vdm
     /// Points along z of a map or of slices; 0: as far apart as along x. Bounds a texel of relief-layers; 0: 4.
     int layers = 0;
     const DistanceTable* table = nullptr;  ///< traced already by tracedBy of these options; null: it is traced

@@ -273,20 +273,20 @@ private:
     std::vector<glm::vec4> texels_;
 };
 
-void append(const Piece& piece, dvec3 extent, std::vector<glm::vec4>& texels) {
+void append(const Piece& piece, dvec3 extent, uint32_t moreBits, std::vector<glm::vec4>& texels) {
     const auto edges = [](const std::array<dvec3, 4>& c) { return glm::dmat3(c[1] - c[0], c[2] - c[0], c[3] - c[0]); };
     const glm::dmat3 weights = glm::inverse(edges(piece.corners)), map = edges(piece.tile) * weights;
     dvec3 q0 = piece.tile[0];
     for (int axis = 0; axis < 2; ++axis) q0[axis] -= extent[axis] * std::floor(q0[axis] / extent[axis]);
     // The rows are those of a matrix that is stored by columns.
     const glm::dmat3 r = glm::transpose(weights), t = glm::transpose(map);
-    texels.push_back(glm::vec4(piece.corners[0], float(piece.bits)));
+    texels.push_back(glm::vec4(piece.corners[0], float(piece.bits | moreBits)));
     for (int row = 0; row < 3; ++row) texels.push_back(glm::vec4(r[row], q0[row]));
     for (int row = 0; row < 3; ++row) texels.push_back(glm::vec4(t[row], float(piece.columns[row])));
 }
 
-/// Appends the direction of each position, by which normals turn between the corners of the base.
-void appendDirections(const BaseSurface& surface, std::vector<glm::vec4>& texels) {
+/// Returns the direction of each position, by which normals turn between the corners of the base, as shells have it.
+std::vector<glm::vec4> gentleDirections(const BaseSurface& surface) {
     std::vector<dvec3> directions = shellDirections(surface);
     std::vector<bool> isSharp(directions.size());
     for (size_t i = 0; i < directions.size(); ++i) {
@@ -299,8 +299,16 @@ void appendDirections(const BaseSurface& surface, std::vector<glm::vec4>& texels
         for (const uint32_t corner : surface.triangles[i])
             if (glm::dot(directions[corner], normal) < kLeastSmooth) isSharp[corner] = true;
     }
+    std::vector<glm::vec4> texels;
     for (size_t i = 0; i < directions.size(); ++i)
         texels.push_back(isSharp[i] ? glm::vec4(0) : glm::vec4(directions[i], 1));
+    return texels;
+}
+
+bool isSmooth(const std::vector<Piece>& pieces, const std::vector<glm::vec4>& directions, const Shell& shell) {
+    const auto isGentle = [&](uint32_t column) { return directions[column].w > 0; };
+    return shell.cut == 0 && shell.inverted == 0 &&
+           std::ranges::all_of(pieces, [&](const Piece& p) { return std::ranges::all_of(p.columns, isGentle); });
 }
 
 bool isFinite(const BaseSurface& surface) {
@@ -375,8 +383,10 @@ Result<Shell> buildShell(const BaseSurface& surface, double height, dvec3 extent
     shell.nodes = uint32_t(shell.texels.size() / Shell::kNodeTexels);
     shell.pieces = uint32_t(pieces.size());
     shell.low = shell.origin + dvec3(shell.texels[0]), shell.high = shell.origin + dvec3(shell.texels[1]);
-    for (const uint32_t i : order) append(pieces[i], extent, shell.texels);
-    appendDirections(surface, shell.texels);
+    const std::vector<glm::vec4> directions = gentleDirections(surface);
+    const uint32_t smooth = isSmooth(pieces, directions, shell) ? f32::kShellSmooth : 0;
+    for (const uint32_t i : order) append(pieces[i], extent, smooth, shell.texels);
+    shell.texels.insert(shell.texels.end(), directions.begin(), directions.end());
     for (const glm::vec4& texel : shell.texels)
         if (!std::isfinite(texel.x + texel.y + texel.z + texel.w))
             return fail(ErrorCode::InvalidInput,

@@ -49,7 +49,8 @@ struct Shell {
     ///           positions of its prism's columns
     ///   direction   (unit normal of the base, 1), or 0 where the base turns sharply there
     /// A face is cut where it is on a border of the base, where the map jumps, or where it is the top over a column
-    /// that was cut: solid shows its cut there.
+    /// that was cut: solid shows its cut there. Bits have f32::kShellSmooth where no column is cut and none of the
+    /// directions is 0.
     static constexpr uint32_t kBase = f32::kShellBaseFace;
     std::vector<glm::vec4> texels;
 };

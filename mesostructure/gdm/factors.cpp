@@ -107,8 +107,59 @@ Clusters farApart(const RowSource& matrix, int clusters, int rank) {
 
 }  // namespace
 
+namespace {
+
+/// Sets the singular values, and what the dropped ones leave.
+void setSingular(const Eigenpairs& pairs, int rank, Factors& factors) {
+    for (Eigen::Index k = 0; k < pairs.values.size(); ++k) {
+        factors.singular.push_back(std::sqrt(pairs.values[k]));
+        if (k >= rank) factors.squaredResidual += pairs.values[k];
+    }
+}
+
+/// Returns singular vectors times the root of their values, and over it in `inverse`: a value of 0 has none. There may
+/// be fewer than the rank; what is missing is 0.
+Eigen::MatrixXd rooted(const Eigenpairs& pairs, int rank, Eigen::MatrixXd& inverse) {
+    Eigen::MatrixXd times = Eigen::MatrixXd::Zero(pairs.vectors.rows(), rank);
+    inverse = times;
+    for (Eigen::Index k = 0; k < std::min<Eigen::Index>(rank, pairs.values.size()); ++k) {
+        const double root = std::sqrt(std::sqrt(pairs.values[k]));
+        times.col(k) = pairs.vectors.col(k) * root;
+        if (root > 0) inverse.col(k) = pairs.vectors.col(k) / root;
+    }
+    return times;
+}
+
+/// A matrix of fewer rows than columns is held whole, and solved by the Gram matrix of its rows.
+Result<void> factorizeRows(const RowSource& matrix, const FactorProgress& progress, Factors& factors) {
+    RowBlock whole(Eigen::Index(matrix.rows), Eigen::Index(matrix.columns));
+    if (!readAll(matrix, progress, 0, 0.6, [&](size_t first, const RowBlock& block) {
+            whole.middleRows(Eigen::Index(first), block.rows()) = block;
+        }))
+        return Error::cancelled();
+    Eigen::MatrixXd gram = Eigen::MatrixXd::Zero(whole.rows(), whole.rows()), toEigen;
+    const Eigen::MatrixXd exact = whole.cast<double>();
+    gram.selfadjointView<Eigen::Lower>().rankUpdate(exact);
+    const Eigenpairs pairs = solve(gram);
+    setSingular(pairs, factors.rank, factors);
+    const RowBlock weights = rooted(pairs, factors.rank, toEigen).cast<float>(),
+                   eigen = (exact.transpose() * toEigen).cast<float>();
+    factors.weights.assign(weights.data(), weights.data() + weights.size());
+    factors.eigen.assign(eigen.data(), eigen.data() + eigen.size());
+    factors.squaredResidualSeen = double((whole - weights * eigen.transpose()).squaredNorm());
+    if (progress && !progress(1)) return Error::cancelled();
+    return {};
+}
+
+}  // namespace
+
 Result<Factors> factorize(const RowSource& matrix, int rank, const FactorProgress& progress) {
     VCP_TRY(check(matrix, rank));
+    Factors factors{matrix.rows, matrix.columns, rank, {}, {}, {}, 0, 0};
+    if (matrix.rows < matrix.columns) {
+        VCP_TRY(factorizeRows(matrix, progress, factors));
+        return factors;
+    }
     const auto n = Eigen::Index(matrix.columns);
     Eigen::MatrixXd gram = Eigen::MatrixXd::Zero(n, n);
     Eigen::MatrixXd rows;
@@ -117,20 +168,11 @@ Result<Factors> factorize(const RowSource& matrix, int rank, const FactorProgres
             gram.selfadjointView<Eigen::Lower>().rankUpdate(rows.transpose());
         }))
         return Error::cancelled();
+    // W = A V / sqrt(sigma), E = V sqrt(sigma).
     const Eigenpairs pairs = solve(gram);
-    Factors factors{matrix.rows, matrix.columns, rank, {}, {}, {}, 0, 0};
-    for (Eigen::Index k = 0; k < n; ++k) {
-        factors.singular.push_back(std::sqrt(pairs.values[k]));
-        if (k >= rank) factors.squaredResidual += pairs.values[k];
-    }
-    // W = A V / sqrt(sigma), E = V sqrt(sigma). A singular value of 0 has no weights.
-    Eigen::MatrixXd toWeights = pairs.vectors.leftCols(rank);
-    RowBlock eigen(n, rank);
-    for (int k = 0; k < rank; ++k) {
-        const double root = std::sqrt(factors.singular[size_t(k)]);
-        eigen.col(k) = (pairs.vectors.col(k) * root).cast<float>();
-        toWeights.col(k) *= root > 0 ? 1 / root : 0;
-    }
+    setSingular(pairs, rank, factors);
+    Eigen::MatrixXd toWeights;
+    const RowBlock eigen = rooted(pairs, rank, toWeights).cast<float>();
     factors.eigen.assign(eigen.data(), eigen.data() + eigen.size());
     factors.weights.resize(matrix.rows * size_t(rank));
     if (!readAll(matrix, progress, 0.6, 1, [&](size_t first, const RowBlock& block) {

@@ -1,7 +1,8 @@
 // A matrix as the product of two thin ones (Wang et al. 2004, 4.1): A ~ sum over k of W_k(row) E_k(column), by the
-// singular value decomposition. A has many rows and few columns, so it is solved by the Gram matrix A^T A, which is
-// summed in double over rows that are read once, and its symmetric eigenproblem; a second reading gives the weights.
-// The root of each singular value is in both factors, so that they have alike ranges.
+// singular value decomposition. A that has many rows and few columns is solved by the Gram matrix A^T A, which is
+// summed in double over rows that are read once, and its symmetric eigenproblem; a second reading gives the weights. A
+// of fewer rows than columns is held whole and solved by A A^T. The root of each singular value is in both factors, so
+// that they have alike ranges.
 //
 // Clustered factors (clustered principal components, Sloan et al. 2003) part the rows into clusters, each with a mean
 // and factors of its own.
@@ -29,7 +30,7 @@ struct Factors {
     int rank = 0;
     std::vector<float> weights;      ///< W: `rank` a row
     std::vector<float> eigen;        ///< E: `rank` a column
-    std::vector<double> singular;    ///< all singular values, greatest first
+    std::vector<double> singular;    ///< as many as A has rows or columns, greatest first
     double squaredResidual = 0;      ///< of the factors before they are rounded: the sum of the dropped squares
     double squaredResidualSeen = 0;  ///< of the float factors, summed over the entries
 };

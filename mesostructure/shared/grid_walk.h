@@ -10,6 +10,7 @@ struct MesoRay {
     bool atTop;      // starts on the slab's top, or above it
     bool isOutside;  // known to be outside the solid before the start, as a ray that comes from another piece of a
                      // shell is
+    float bend;      // MarchRay::bend; 0: the ray is straight
 };
 
 struct MesoResult {

@@ -298,6 +298,8 @@ INLINE MesoResult marchMeso(MesoRay ray) {
         marchSphere(ray, result);
     else if (kWalk == kMesoGdm)
         marchGdm(ray, result);
+    else if (kWalk == kMesoVdm && kRefinement == kMesoBent)
+        marchBent(ray, result);
     else if (kWalk == kMesoVdm)
         marchVdm(ray, result);
     else if (kWalk == kMesoSlices)

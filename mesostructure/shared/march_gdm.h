@@ -30,26 +30,7 @@ INLINE Between betweenClamped(float at, int n) {
     return b;
 }
 
-// Returns the angle of a place from the x axis, in turns from 0 to 1. A polynomial, so that devices and processors
-// agree: their own functions may be off by thousands of units of the last place (Abramowitz and Stegun 4.4.49).
-INLINE float turnOf(float x, float y) {
-    float ax = abs(x), ay = abs(y), most = max(ax, ay);
-    if (most == 0.0f) return 0.0f;
-    float a = min(ax, ay) / most, s = a * a;
-    float p = 0.0028662257f * s - 0.0161657367f;
-    p = p * s + 0.0429096138f;
-    p = p * s - 0.0752896400f;
-    p = p * s + 0.1065626393f;
-    p = p * s - 0.1420889944f;
-    p = p * s + 0.1999355085f;
-    p = p * s - 0.3333314528f;
-    float turn = (a + a * s * p) * 0.15915494309f;
-    if (ay > ax) turn = 0.25f - turn;
-    if (x < 0.0f) turn = 0.5f - turn;
-    return y < 0.0f ? 1.0f - turn : turn;
-}
-
-// A query: a place in the tile and a direction, among the samples.
+// A query: a place in the tile and a direction, among the samples; z is the curvature in a view-dependent map.
 struct GdmQuery {
     Between x, y, z, theta, phi;
 };
@@ -70,20 +51,23 @@ INLINE GdmQuery queryAt(vec3 p, vec3 d) {
 INLINE int atCorner(CONST_REF(Between) b, int upper) { return upper != 0 ? b.high : b.low; }
 INLINE float weightOf(CONST_REF(Between) b, int upper) { return upper != 0 ? b.w : 1.0f - b.w; }
 
-// The table's row and column at a corner of the query: the bits of `corner` are upper x, y, phi, theta, z.
+// The table's row and column at a corner of the query: the bits of `corner` are upper x, y, phi, theta, z. Over flat
+// bases alone, a view-dependent map has none for the last.
 INLINE uint gdmRow(CONST_REF(GdmQuery) q, int corner) {
     int plane = kWalk == kMesoVdm ? 0 : atCorner(q.phi, corner & 4);
     return uint(atCorner(q.x, corner & 1) + meso.fine.x * (atCorner(q.y, corner & 2) + meso.fine.y * plane));
 }
 INLINE uint gdmColumn(CONST_REF(GdmQuery) q, int corner) {
     int theta = atCorner(q.theta, corner & 8);
-    return uint(kWalk == kMesoVdm ? theta * meso.azimuths + atCorner(q.phi, corner & 4)
-                                  : theta * meso.fine.z + atCorner(q.z, corner & 16));
+    if (kWalk != kMesoVdm) return uint(theta * meso.fine.z + atCorner(q.z, corner & 16));
+    int direction = theta * meso.azimuths + atCorner(q.phi, corner & 4);
+    if (kRefinement == kMesoStraight) return uint(direction);
+    return uint(atCorner(q.z, corner & 16) * meso.elevations * meso.azimuths + direction);
 }
 INLINE float gdmWeight(CONST_REF(GdmQuery) q, int corner) {
     float w = weightOf(q.x, corner & 1) * weightOf(q.y, corner & 2) * weightOf(q.phi, corner & 4) *
               weightOf(q.theta, corner & 8);
-    return kWalk == kMesoVdm ? w : w * weightOf(q.z, corner & 16);
+    return kWalk == kMesoVdm && kRefinement == kMesoStraight ? w : w * weightOf(q.z, corner & 16);
 }
 
 INLINE vec4 factorAt(uint array, uint texel) {
@@ -108,14 +92,12 @@ INLINE float factoredDistance(CONST_REF(GdmQuery) q, INOUT(MesoResult) result) {
             if (kWalk != kMesoVdm) w *= weightOf(q.phi, corner & 4);
             weight += w * factorAt(meso.data, uint(group * meso.cellCount) + gdmRow(q, corner));
         }
-        for (int k = 0; k < 4; ++k) {
-            // Theta, and phi or z.
-            int second = kWalk == kMesoVdm ? 4 : 16, corner = (k & 1) * 8 + (k >> 1) * second;
+        for (int k = 0; k < (kWalk == kMesoVdm && kRefinement == kMesoBent ? 8 : 4); ++k) {
+            // Theta, and z; in a view-dependent map theta, phi, and the curvature.
+            int second = kWalk == kMesoVdm ? 4 : 16, corner = (k & 1) * 8 + (k >> 1 & 1) * second + (k >> 2) * 16;
             float w = weightOf(q.theta, corner & 8);
-            if (kWalk == kMesoVdm)
-                w *= weightOf(q.phi, corner & 4);
-            else
-                w *= weightOf(q.z, corner & 16);
+            if (kWalk == kMesoVdm) w *= weightOf(q.phi, corner & 4);
+            if (kWalk != kMesoVdm || kRefinement == kMesoBent) w *= weightOf(q.z, corner & 16);
             value += w * factorAt(meso.rows, uint(group * meso.columnCount) + gdmColumn(q, corner));
         }
         sum += dot(weight, value);
@@ -123,9 +105,9 @@ INLINE float factoredDistance(CONST_REF(GdmQuery) q, INOUT(MesoResult) result) {
     return sum * meso.step;
 }
 
-// A table of itself is a volume for each direction, or a picture: four of them are filtered.
+// A table of itself is a volume for each direction, or over flat bases a picture: four of them are filtered.
 INLINE float tableDistance(CONST_REF(GdmQuery) q, INOUT(MesoResult) result) {
-    int corners = kWalk == kMesoVdm ? 16 : 32;
+    int corners = kWalk == kMesoVdm && kRefinement == kMesoStraight ? 16 : 32;
     result.fetches += 4u;
     float sum = 0.0f;
     for (int corner = 0; corner < corners; ++corner) {
@@ -213,6 +195,70 @@ INLINE void marchVdm(MesoRay ray, INOUT(MesoResult) result) {
     vec4 property = propertyAt(ray.o + t * ray.d, result);
     if (kSurface != kMesoVisibilityBit && property.w <= 0.0f) return;
     hitWithProperty(t, property, result);
+}
+
+// Where a ray over a base that bends is at the slab's top, and in which direction it goes down from there, or comes up.
+struct BentTop {
+    vec3 place;
+    vec2 across;      // unit, along the tile, the way that the ray goes down
+    BentPath down;    // from the top
+    bool isUp;        // the ray itself comes up by it
+    float at, scale;  // time from the ray's start, and of one unit of `down`
+};
+
+INLINE bool bentTop(MesoRay ray, OUT(BentTop) top) {
+    float run = length(vec2(ray.d.x, ray.d.y)), height = meso.extent.z;
+    BentPath own;
+    own.z = ray.atTop ? height : clamp(ray.o.z, 0.0f, height);
+    own.c = clamp(curvatureOfBend(ray.bend, own.z), -meso.mostCurvature, meso.mostCurvature);
+    own.run = run;
+    own.rise = ray.d.z;
+    if (!bentReaches(own, height, top.at)) return false;
+    vec2 heading = bentHeading(own, top.at);
+    float speed = length(heading);
+    top.isUp = heading.y >= 0.0f;
+    top.scale = 1.0f / speed;
+    top.across = run > 0.0f ? vec2(ray.d.x, ray.d.y) / run : vec2(1.0f, 0.0f);
+    vec2 moved = bentAlong(own, top.at) * top.across;
+    top.place = vec3(ray.o.x + moved.x, ray.o.y + moved.y, height);
+    if (top.isUp) top.across = -top.across;
+    top.down.c = own.c;
+    top.down.z = height;
+    top.down.run = heading.x / speed;
+    top.down.rise = -abs(heading.y) / speed;
+    return top.down.rise < 0.0f;
+}
+
+// Turns a normal of a place along a bent base into the frame of another: `along` ahead of it, in the direction
+// `across`.
+INLINE vec3 turnedBack(vec3 n, vec2 across, float angle) {
+    float ahead = dot(vec2(n.x, n.y), across), turned = ahead * cos(angle) + n.z * sin(angle);
+    vec2 level = vec2(n.x, n.y) + (turned - ahead) * across;
+    return vec3(level.x, level.y, n.z * cos(angle) - ahead * sin(angle));
+}
+
+// The same over a base that bends, as MesoRay::bend says. The ray is carried to the top along its own curve. The normal
+// is in the frame of the ray's start.
+INLINE void marchBent(MesoRay ray, INOUT(MesoResult) result) {
+    result.iterations++;
+    BentTop top;
+    if (!bentTop(ray, top)) return;
+    GdmQuery q = queryAt(top.place, vec3(top.down.run * top.across.x, top.down.run * top.across.y, top.down.rise));
+    q.z = betweenClamped((top.down.c / meso.mostCurvature + 1.0f) * 0.5f * float(meso.curvatures - 1), meso.curvatures);
+    bool byBottom;
+    float leaves = bentExit(top.down, byBottom), seen = min(gdmDistance(q, result), leaves),
+          t = top.at + (top.isUp ? -seen : seen) * top.scale;
+    float own = top.isUp ? 0.5f * meso.extent.x / float(meso.fine.x) : 0.0f;
+    if (t > ray.tMax || t < own) return;
+    if (kSurface == kMesoVisibilityBit && !isHitNear(q, result)) return;
+    float along = bentAlong(top.down, seen);
+    vec3 place =
+        vec3(top.place.x + along * top.across.x, top.place.y + along * top.across.y, bentHeight(top.down, seen));
+    vec4 property = propertyAt(place, result);
+    if (kSurface != kMesoVisibilityBit && property.w <= 0.0f) return;
+    hitWithProperty(t, property, result);
+    vec2 moved = vec2(place.x - ray.o.x, place.y - ray.o.y);
+    result.normal = turnedBack(result.normal, top.across, top.down.c * dot(moved, top.across));
 }
 
 // Layers of the volume, nearest first, along the axis that the ray passes most of them of; the first whose density is a

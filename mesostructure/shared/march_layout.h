@@ -14,7 +14,8 @@ const uint kMesoDensity = 0u, kMesoVisibilityBit = 1u;  // kSurface of a displac
 const uint kMesoCell = 0u, kMesoPatches = 1u, kMesoHeights = 2u, kMesoField = 3u,
            kMesoLayers = 4u;  // kSurface; the last of relief mapping
 const uint kMesoUnrefined = 0u, kMesoBinary = 1u, kMesoSecant = 2u, kMesoAsPrinted = 3u,
-           kMesoIllinois = 4u;  // kRefinement
+           kMesoIllinois = 4u;                  // kRefinement
+const uint kMesoStraight = 0u, kMesoBent = 1u;  // kRefinement of a view-dependent map: over flat bases, or all
 
 const uint kMesoHit = 0u, kMesoMiss = 1u, kMesoUnresolved = 2u;  // the states of a ray
 
@@ -63,10 +64,13 @@ struct MesoRecord {
     uint data;                             // word of texels, samples or ranks
     uint rows;                             // word of the rows
     uint patches;                          // first quad of the patches
-    float step;         // tile units of a step of a height or (sphere, displacement maps) of a distance
-    float height;       // of the slab, tile units
-    float tolerance;    // (relief)
-    uint patchNormals;  // first quad of the patches' normals; 0: there are none
+    float step;           // tile units of a step of a height or (sphere, displacement maps) of a distance
+    float height;         // of the slab, tile units
+    float tolerance;      // (relief)
+    uint patchNormals;    // first quad of the patches' normals; 0: there are none
+    int curvatures;       // (view-dependent maps) samples of the base's curvature
+    float mostCurvature;  // and the greatest, 1 over tile units
+    uint unused0, unused1;
     MesoLevel levels[kMesoMaxLevels];
     MesoBorder borders[kMesoMostBorders];
 };

@@ -19,6 +19,7 @@ Result<void> MesoRaysPass::prepare(const meso::MarchArrays& arrays, std::span<co
         const meso::f32::MesoRay ray = meso::rayInTile(given, arrays);
         texels.push_back(glm::vec4(ray.o, ray.tMax));
         texels.push_back(glm::vec4(ray.d, ray.atTop ? 1 : 0));
+        texels.push_back(glm::vec4(ray.bend, 0, 0, 0));
     }
     count_ = uint32_t(rays.size());
     VCP_TRY_ASSIGN(words_, resources_.words(arrays.words));

@@ -1,4 +1,5 @@
 // The marchers of mesostructure/shared/, one a pipeline by the constants of meso_bindings.glsl.
+#include "mesostructure/gdm/bent_path.h"
 #include "mesostructure/shared/cell_solve.h"
 #include "mesostructure/shared/cone_lookup.h"
 #include "mesostructure/shared/grid_walk.h"

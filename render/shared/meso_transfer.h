@@ -1,15 +1,21 @@
 // Light from everywhere on a hit whose surface has a volume of transfer (mesostructure/transfer_volume.h). Compiles as
 // shell_cast.h does, which includes it; mesostructure/shared/transfer_lookup.h is before both.
 
+// Adds what the corners of a piece have of anything to the columns that they are on.
+INLINE vec3 ofColumns(uint bits, vec4 corners) {
+    uint part = bits >> kShellPart & 3u;
+    return part == 0u   ? vec3(corners.x, corners.y, corners.z + corners.w)
+           : part == 1u ? vec3(corners.x, corners.y + corners.z, corners.w)
+                        : vec3(corners.x + corners.y, corners.z, corners.w);
+}
+
 // Returns the part of a hit's base that each of the columns of its piece has; the sum is 1.
 INLINE vec3 columnWeights(int piece, vec3 p) {
     vec4 corner = fetchInput(piece);
     vec3 at = p - vec3(corner);
     float b = dot(vec3(fetchInput(piece + 1)), at), c = dot(vec3(fetchInput(piece + 2)), at),
-          d = dot(vec3(fetchInput(piece + 3)), at), a = 1.0f - b - c - d;
-    uint part = uint(corner.w) >> kShellPart & 3u;
-    vec3 weights = part == 0u ? vec3(a, b, c + d) : part == 1u ? vec3(a, b + c, d) : vec3(a + b, c, d);
-    weights = max(weights, vec3(0.0f));
+          d = dot(vec3(fetchInput(piece + 3)), at);
+    vec3 weights = max(ofColumns(uint(corner.w), vec4(1.0f - b - c - d, b, c, d)), vec3(0.0f));
     return weights / (weights.x + weights.y + weights.z);
 }
 

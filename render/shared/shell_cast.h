@@ -63,6 +63,7 @@ INLINE bool passesPiece(uint piece, vec3 o, vec3 d, float start, float tMax, INO
     passage.enter = -start;
     passage.leave = tMax - start;
     passage.entered = -1;
+    passage.left = -1;
     passage.toBase = false;
     for (int i = 0; i < 4; i++) {
         float time = -a[i] / b[i];
@@ -70,6 +71,7 @@ INLINE bool passesPiece(uint piece, vec3 o, vec3 d, float start, float tMax, INO
             passage.entered = i;
             passage.enter = time;
         } else if (b[i] < 0.0f && time < passage.leave) {
+            passage.left = i;
             passage.toBase = i == 3 && (uint(corner.w) & kShellBaseFace) != 0u;
             passage.leave = time;
         } else if (b[i] == 0.0f && a[i] < 0.0f)
@@ -84,6 +86,81 @@ INLINE void hitShell(float t, vec3 normal, int piece, bool far, INOUT(ShellHit) 
     best.piece = piece;
     best.far = far;
     best.cut = false;
+    best.base = false;
+    best.asked = kMesoNoHit;
+}
+
+// Hits the base, where a ray that was asked for all of its way before has seen nothing else.
+INLINE void hitBase(float t, vec3 normal, int piece, INOUT(ShellHit) best) {
+    if (t > best.t || best.asked < t) return;
+    hitShell(t, normal, piece, false, best);
+    best.base = true;
+}
+
+// Returns the directions of the base over the columns of a piece; those at sharp edges have the piece's own.
+INLINE mat3 columnDirections(int piece, vec3 own) {
+    int first = int(kShellNodeTexels * view.nodes + kShellPieceTexels * view.pieces);
+    mat3 directions;
+    for (int k = 0; k < 3; k++) {
+        vec4 column = fetchInput(first + int(fetchInput(piece + 4 + k).w));
+        directions[k] = column.w > 0.0f ? vec3(column) : own;
+    }
+    return directions;
+}
+
+// Turns a vector the shortest way, as one unit vector is turned to another that is not far from it.
+INLINE vec3 turnedFrom(vec3 from, vec3 to, vec3 v) {
+    float same = dot(from, to);
+    if (!(same > 0.5f)) return v;
+    vec3 sum = from + to;
+    return v + 2.0f * dot(from, v) * to - dot(sum, v) / (1.0f + same) * sum;
+}
+
+// Returns MesoRay::bend in a piece whose base has these directions: how much they turn along the tile, over how long
+// the tile is there against its height.
+INLINE float bendOver(int piece, vec3 d, mat3 directions, vec3 up) {
+    vec4 corner = fetchInput(piece), r0 = fetchInput(piece + 1), r1 = fetchInput(piece + 2), r2 = fetchInput(piece + 3);
+    vec3 t0 = vec3(fetchInput(piece + 4)), t1 = vec3(fetchInput(piece + 5)), t2 = vec3(fetchInput(piece + 6));
+    vec3 x = cross(t1, t2), y = cross(t2, t0);
+    float volume = dot(t0, x), run = length(vec2(d.x, d.y));
+    if (volume == 0.0f || run == 0.0f) return 0.0f;
+    vec3 along = (d.x * x + d.y * y) / (run * volume);  // of a unit of the tile, in the world
+    float b = dot(vec3(r0), along), c = dot(vec3(r1), along), e = dot(vec3(r2), along);
+    vec3 turn = directions * ofColumns(uint(corner.w), vec4(-b - c - e, b, c, e));
+    return dot(turn, along) * length(t2) / length(up);
+}
+
+// Asks a map of curvatures once for a ray's way, over a base that bends as it does where the ray comes in: all of its
+// way where the shell is smooth, or else the piece's part of it.
+INLINE void askBent(ShellPassage passage, MesoRay ray, vec3 place, float scale, float start, vec3 d, bool whole,
+                    INOUT(ShellHit) best) {
+    int at = passage.at;
+    vec3 t0 = vec3(fetchInput(at + 4)), t1 = vec3(fetchInput(at + 5)), t2 = vec3(fetchInput(at + 6));
+    vec3 own = normalize(t2);
+    mat3 directions = columnDirections(at, own);
+    vec3 up = directions * columnWeights(at, place), turned = turnedFrom(normalize(up), own, d);
+    ray.d = vec3(dot(t0, turned), dot(t1, turned), dot(t2, turned)) / scale;
+    float longer = length(ray.d);
+    ray.d = ray.d / longer;
+    ray.bend = bendOver(at, ray.d, directions, up);
+    ray.tMax = whole ? kMostReach : ray.tMax * longer;
+    MesoResult found = marchMeso(ray);
+    best.iterations += found.iterations;
+    float asked = start + passage.enter, t = asked + found.t / (scale * longer);
+    // The base lies behind whatever is seen over it, however far off that is said to be.
+    if (found.state != kMesoHit || !(t < best.t || (best.base && asked < best.t))) return;
+    if (best.border > asked && best.border < t) return;
+    vec3 n = found.normal != vec3(0.0f) ? found.normal : vec3(0.0f, 0.0f, 1.0f);
+    n = t0 * n.x + t1 * n.y + t2 * n.z;
+    hitShell(t, turnedFrom(own, normalize(up), n), at, false, best);
+    best.asked = asked;
+}
+
+// A ray leaves a smooth shell by its border: what was seen beyond is not there.
+INLINE void leaveBent(ShellPassage passage, float start, INOUT(ShellHit) best) {
+    float t = start + passage.leave;
+    best.border = min(best.border, t);
+    if (best.asked < t && t < best.t) hitShell(kMesoNoHit, vec3(0.0f), 0, false, best);
 }
 
 INLINE void castPiece(ShellPassage passage, vec3 o, vec3 d, float start, INOUT(ShellHit) best) {
@@ -92,7 +169,7 @@ INLINE void castPiece(ShellPassage passage, vec3 o, vec3 d, float start, INOUT(S
     uint bits = uint(corner.w);
     // The weight of the corner above, whose row of R r2 is, grows away from the base.
     if (entered == 3 && (bits & kShellBaseFace) != 0u && view.withBase != 0u) {
-        hitShell(start + passage.enter, -vec3(r2), at, false, best);
+        hitBase(start + passage.enter, -vec3(r2), at, best);
         return;
     }
     bool fromCut = entered >= 0 && (bits & (1u << uint(entered))) != 0u;
@@ -109,6 +186,7 @@ INLINE void castPiece(ShellPassage passage, vec3 o, vec3 d, float start, INOUT(S
         ray.atTop = false;
         // A ray that comes from another piece was outside there, or had its hit there.
         ray.isOutside = entered >= 0;
+        ray.bend = 0.0f;
         vec3 cut = entered == 0   ? vec3(r0) + vec3(r1) + vec3(r2)
                    : entered == 1 ? -vec3(r0)
                    : entered == 2 ? -vec3(r1)
@@ -122,6 +200,17 @@ INLINE void castPiece(ShellPassage passage, vec3 o, vec3 d, float start, INOUT(S
         if (fromCut && (far ? ray.o.z < view.meanHeight : isSolidAt(ray.o))) {
             hitShell(start + passage.enter, cut, at, false, best);
             best.cut = true;
+            return;
+        }
+        if (kWalk == kMesoVdm && kRefinement == kMesoBent && !far) {
+            // The uppermost face of a prism is opposite to the first corner of its last piece.
+            bool whole = (bits & kShellSmooth) != 0u, isTop = entered == 0 && (bits >> kShellPart & 3u) == 2u;
+            ray.atTop = isTop && whole;
+            if (!whole || isTop || entered < 0 || fromCut)
+                askBent(passage, ray, o + passage.enter * d, scale, start, d, whole, best);
+            if (whole && passage.left >= 0 && (bits & (1u << uint(passage.left))) != 0u)
+                leaveBent(passage, start, best);
+            if (passage.toBase && view.withBase != 0u) hitBase(start + passage.leave, vec3(r2), at, best);
             return;
         }
         MesoResult found;
@@ -143,7 +232,7 @@ INLINE void castPiece(ShellPassage passage, vec3 o, vec3 d, float start, INOUT(S
             return;
         }
     }
-    if (passage.toBase && view.withBase != 0u) hitShell(start + passage.leave, vec3(r2), at, false, best);
+    if (passage.toBase && view.withBase != 0u) hitBase(start + passage.leave, vec3(r2), at, best);
 }
 
 INLINE float boxEntry(uint node, vec3 o, vec3 inverse, float leave, INOUT(vec4) low, INOUT(vec4) high) {
@@ -157,26 +246,15 @@ INLINE float boxEntry(uint node, vec3 o, vec3 inverse, float leave, INOUT(vec4) 
 // Turns the normal of a hit as the base turns between its corners: a piece's own up jumps from piece to piece. Columns
 // at sharp edges of the base have no direction and take the piece's.
 INLINE vec3 turnedWithBase(int piece, vec3 p, vec3 n) {
-    vec4 t0 = fetchInput(piece + 4), t1 = fetchInput(piece + 5), t2 = fetchInput(piece + 6);
-    vec3 own = normalize(vec3(t2)), weights = columnWeights(piece, p), columns = vec3(t0.w, t1.w, t2.w);
-    vec3 up = vec3(0.0f);
-    int first = int(kShellNodeTexels * view.nodes + kShellPieceTexels * view.pieces);
-    for (int k = 0; k < 3; k++) {
-        vec4 column = fetchInput(first + int(columns[k]));
-        up += weights[k] * (column.w > 0.0f ? vec3(column) : own);
-    }
-    up = normalize(up);
-    float same = dot(own, up);
-    if (!(same > 0.5f)) return n;
-    // The shortest turn from one to the other.
-    vec3 sum = own + up;
-    return n + 2.0f * dot(own, n) * up - dot(sum, n) / (1.0f + same) * sum;
+    vec3 own = normalize(vec3(fetchInput(piece + 6)));
+    return turnedFrom(own, normalize(columnDirections(piece, own) * columnWeights(piece, p)), n);
 }
 
 INLINE ShellHit castShell(vec3 eye, vec3 d, float tMax) {
     ShellHit best;
     best.iterations = 0u;
     best.unresolved = false;
+    best.border = kMesoNoHit;
     hitShell(tMax, vec3(0.0f), 0, false, best);
     vec3 inverse = 1.0f / mix(d, vec3(1e-18f), lessThan(abs(d), vec3(1e-18f)));
     vec4 low, high;
@@ -223,7 +301,8 @@ INLINE ShellHit castShell(vec3 eye, vec3 d, float tMax) {
     }
     // This also covers devices that end a long loop by themselves, as software ones do.
     if (left > 0u || depth > 0) best.unresolved = true;
-    if (best.t < tMax && !best.cut) best.normal = turnedWithBase(best.piece, o + (best.t - start) * d, best.normal);
+    if (best.t < tMax && !best.cut && best.asked >= kMesoNoHit)
+        best.normal = turnedWithBase(best.piece, o + (best.t - start) * d, best.normal);
     return best;
 }
 

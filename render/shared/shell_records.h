@@ -24,6 +24,11 @@ struct ShellHit {
     int piece;  // first texel of its piece
     bool far;   // not marched: normal and light come from the appearance
     bool cut;   // of a border or a section plane: what is shown lies within the solid
+    bool base;  // the base itself
+    // Of maps that are asked once for all of a ray's way through the shell: when the ray that hit came into it;
+    // kMesoNoHit for other hits, which lie where they are found.
+    float asked;
+    float border;  // when the ray first leaves such a shell by its border; kMesoNoHit
 };
 
 // Where a ray passes a piece; times count from a point of the ray where numbers are small.
@@ -31,6 +36,7 @@ struct ShellPassage {
     int at;  // texel of the piece
     float enter, leave;
     int entered;  // the corner opposite to the face that it comes in by; -1: it starts within
+    int left;     // that opposite to the face that it leaves by; -1: it ends within
     bool toBase;
 };
 

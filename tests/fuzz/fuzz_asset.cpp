@@ -53,7 +53,7 @@ void hashFile(Bytes& file) {
 void march(const Result<std::unique_ptr<Marcher>>& marcher, double top) {
     if (!marcher) return;
     for (int i = 0; i < 4; ++i)
-        static_cast<void>((*marcher)->march({{0.1 * i, 0.2, top}, {0.6, 0, i % 2 ? 0.8 : -0.8}}));
+        static_cast<void>((*marcher)->march({{0.1 * i, 0.2, top}, {0.6, 0, i % 2 ? 0.8 : -0.8}, 64, i - 1.5}));
 }
 
 }  // namespace
@@ -65,6 +65,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     const auto asset = parseAsset(file, "fuzz");
     if (!asset) return 0;
     if (asset->gdm) march(gdmMarcher(*asset->gdm), asset->extent.z);
+    if (asset->vdm) march(gdmMarcher(*asset->vdm), asset->extent.z);
     if (asset->compressed && asset->patches)
         march(gridMarcher({.compressed = &*asset->compressed}, {.patches = &*asset->patches}), asset->extent.z);
     return 0;

@@ -42,8 +42,8 @@ const std::vector<Room>& rooms() {
         {"render/host", {"octree/", "mesostructure", "render/shared"}},
         {"render/pages", {"octree/", "streaming", "render/shared"}},
         {"render",
-         {"octree/", "mesostructure", "mesostructure/remesh", "streaming", "render/shared", "render/host",
-          "render/pages"}},
+         {"octree/", "mesostructure", "mesostructure/gdm", "mesostructure/remesh", "streaming", "render/shared",
+          "render/host", "render/pages"}},
 
         {"viewer/annotation", {"octree/", "render"}},
         {"viewer/camera", {"octree/", "render"}},

@@ -89,6 +89,9 @@ Asset withMap(int rank, bool withVisibility) {
                    .rank = rank,
                    .bits = rank == 8 ? 8 : 16,
                    .withVisibility = withVisibility};
+    options.vdm = options.gdm;
+    options.vdm->traced.curvatures = {rank == 4 ? 1 : 3, 0.4};
+    options.vdm->withVisibility = options.vdm->traced.curvatures.samples > 1;
     const auto built = buildAsset(asset, options);
     EXPECT_TRUE(built.ok()) << built.error().line();
     return asset;
@@ -110,11 +113,20 @@ TEST(AssetFile, DisplacementMapsAndGuessesComeBack) {
         if (rank > 0) {
             EXPECT_EQ(read->gdm->factors->weights, asset.gdm->factors->weights);
         }
+        EXPECT_EQ(read->vdm->bytes(), asset.vdm->bytes());
+        EXPECT_EQ(read->vdm->table.steps, asset.vdm->table.steps);
+        EXPECT_EQ(read->vdm->table.nodes, glm::ivec3(5, 4, 1));
+        EXPECT_EQ(read->vdm->table.curvatures, asset.vdm->table.curvatures);
+        EXPECT_EQ(read->vdm->table.directions.direction(0, 0), asset.vdm->table.directions.direction(0, 0));
+        EXPECT_EQ(read->vdm->properties.texels, asset.vdm->properties.texels);
         // A method without a size of its own takes what is stored.
         const auto shape = *shapeOf(*read);
         const auto method = buildMethod(*read, *shape, {.name = "gdm"});
         ASSERT_TRUE(method) << method.error().line();
         EXPECT_EQ(method->gdm->table.nodes, glm::ivec3(5, 4, 3));
+        const auto ofTop = buildMethod(*read, *shape, {.name = "vdm"});
+        ASSERT_TRUE(ofTop) << ofTop.error().line();
+        EXPECT_EQ(ofTop->gdm->table.curvatures, asset.vdm->table.curvatures);
         const auto safe = buildMethod(*read, *shape, {.name = "gdm-safe"});
         ASSERT_TRUE(safe) << safe.error().line();
         EXPECT_EQ(safe->guesses->rows, asset.guesses->rows);
@@ -286,7 +298,7 @@ TEST(AssetFile, LiesOfMapsAreRefusedOrHarmless) {
         int refused = 0;
         for (int i = 0; i < 1500; ++i) {
             Bytes changed = bytes;
-            const size_t first = 256 + 48 * 6, at = first + random() % (changed.size() - first - 64);
+            const size_t first = 256 + 48 * 7, at = first + random() % (changed.size() - first - 64);
             const uint32_t value = i % 3 == 0 ? 0xffffffffu : i % 3 == 1 ? uint32_t(random()) : uint32_t(random() % 40);
             std::memcpy(changed.data() + at, &value, std::min<size_t>(4, changed.size() - 64 - at));
             resign(changed);
@@ -295,13 +307,17 @@ TEST(AssetFile, LiesOfMapsAreRefusedOrHarmless) {
             if (!read) continue;
             const auto marcher = gdmMarcher(*read->gdm);
             ASSERT_TRUE(marcher.ok());
+            const auto ofTop = gdmMarcher(*read->vdm);
+            ASSERT_TRUE(ofTop.ok());
             const OctantBoxes boxes = buildOctantBoxes(*read->occupancy);
             const auto safe =
                 gridMarcher({.boxes = &boxes, .guesses = &*read->guesses, .mostGuesses = 3}, {.field = &*read->field});
             ASSERT_TRUE(safe.ok());
             for (int k = 0; k < 5; ++k) {
-                const MarchRay ray = test::rayFromTop(random, read->extent);
+                MarchRay ray = test::rayFromTop(random, read->extent);
                 static_cast<void>((*marcher)->march(ray)), static_cast<void>((*safe)->march(ray));
+                ray.bend = k - 2;
+                static_cast<void>((*ofTop)->march(ray));
             }
         }
         EXPECT_GT(refused, 20) << rank;

@@ -120,6 +120,8 @@ TEST(FrameLayout, Mesostructure) {
                                                AT(MesoRecord, rows),       AT(MesoRecord, patches),
                                                AT(MesoRecord, step),       AT(MesoRecord, height),
                                                AT(MesoRecord, tolerance),  AT(MesoRecord, patchNormals),
+                                               AT(MesoRecord, curvatures), AT(MesoRecord, mostCurvature),
+                                               AT(MesoRecord, unused0),    AT(MesoRecord, unused1),
                                                AT(MesoRecord, levels),     AT(MesoRecord, borders)}));
     EXPECT_EQ(offsets.at("MesoLevel"), (Words{AT(MesoLevel, first), AT(MesoLevel, entries),
                                               AT(MesoLevel, edgeAndFactor), AT(MesoLevel, unused)}));

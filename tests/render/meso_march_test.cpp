@@ -126,6 +126,20 @@ TEST_F(MesoMarch, SolidsAsTheReference) {
         expectSame(asset, *shape, {.name = "ddm", .cells = 13, .cones = cones}, rays);
 }
 
+TEST_F(MesoMarch, RaysOverBasesThatBendAsTheReference) {
+    Asset asset;
+    asset.name = "fbm";
+    asset.heights = *makeHeightField("fbm", 32, 3);
+    const auto shape = test::heights(*asset.heights);
+    auto rays = raysInto(shape->extent());
+    std::mt19937 random(5);
+    std::uniform_real_distribution<double> bend(-0.3, 0.7);
+    for (MarchRay& ray : rays) ray.bend = bend(random) / shape->extent().z;
+    for (const int rank : {0, 12})
+        expectSame(asset, *shape,
+                   {.name = "vdm", .cells = 12, .rank = rank, .directions = {8, 16}, .curvatures = {3, 0.5}}, rays);
+}
+
 /// The tile's edge along y is no sum of powers of two: rays of far tiles must not drift by its rounding.
 TEST_F(MesoMarch, RaysOfFarTilesHitWhereTheTruthSays) {
     Asset asset;

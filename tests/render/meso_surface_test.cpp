@@ -122,6 +122,40 @@ TEST_F(MesoSurfaces, PlateauOnASphereIsASphereWithoutHoles) {
     }
 }
 
+/// On a smooth base one question answers for all of a ray's way, where the base bends away as well.
+TEST_F(MesoSurfaces, ViewDependentMapsAreAskedOnceARay) {
+    const double height = 0.2, radius = 1 + 0.6 * height;
+    draw({mesoSurface(plateau(), "vdm", "sphere", height, 3)}, fromAbove());
+    const auto depths = *renderer_->readDepth();
+    const auto normals = *renderer_->readNormals();
+    const auto questions = *renderer_->readIterations();
+    int missed = 0;
+    double asked = 0, over = 0;
+    for (uint32_t y = 0; y < kEdge; ++y)
+        for (uint32_t x = 0; x < kEdge; ++x) {
+            const glm::dvec2 p = placeOf(x, y);
+            const size_t i = y * kEdge + x;
+            const double r = glm::length(p);
+            // Where pieces meet, all that are met within rounding are asked.
+            EXPECT_LE(questions[i], 6u) << x << ", " << y;
+            asked += questions[i];
+            over += questions[i] > 0;
+            // Towards the silhouette eight points a tile and samples of curvature that are far apart say little.
+            if (r > 0.6) continue;
+            missed += !std::isfinite(depths[i]);
+            if (!std::isfinite(depths[i])) continue;
+            const glm::dvec3 hit(p, 5 - double(depths[i]));
+            EXPECT_NEAR(glm::length(hit), radius, 0.05) << x << ", " << y;
+            EXPECT_GT(glm::dot(glm::dvec3(normals[i]), glm::normalize(hit)), 0.95) << x << ", " << y;
+        }
+    EXPECT_EQ(missed, 0);
+    EXPECT_LT(asked, 1.1 * over);
+    // A base with edges is asked in each piece.
+    draw({mesoSurface(plateau(), "vdm", "box", height, 3)}, fromAbove());
+    const auto ofBox = *renderer_->readIterations();
+    EXPECT_GT(*std::ranges::max_element(ofBox), 2u);
+}
+
 /// Pieces are flat between their corners, by 6 degrees here; normals are those of the ball that they stand for.
 TEST_F(MesoSurfaces, NormalsTurnAsASmoothBaseDoes) {
     draw({mesoSurface(plateau(), "pyramid", "sphere", 0.2, 3)}, fromAbove());

@@ -263,7 +263,7 @@ BenchMesoRow rowOf(const Subject& subject, const Measured& method, const RayView
 Result<const Subject::Traced*> tracedOf(Subject& subject, const GdmOptions& options) {
     for (const auto& t : subject.traced)
         if (t->options.points == options.points && t->options.directions == options.directions &&
-            t->options.ofTop == options.ofTop)
+            t->options.ofTop == options.ofTop && t->options.curvatures == options.curvatures)
             return t.get();
     auto made = std::make_unique<Subject::Traced>();
     made->options = options;
@@ -278,6 +278,8 @@ Result<Measured> measuredOf(Subject& subject, const Entry& entry) {
     Measured method;
     method.name = entry.options.name, method.knob = entry.knob;
     MethodOptions options = entry.options;
+    // The tile lies flat.
+    options.curvatures = {};
     double traceSeconds = 0;
     if (options.name == "gdm" || options.name == "gdm-visibility" || options.name == "vdm") {
         VCP_TRY_ASSIGN(const auto* traced, tracedOf(subject, tracedBy(*subject.shape, options)));
@@ -408,6 +410,14 @@ Result<BenchMesoReport> benchMeso(const BenchMesoOptions& options) {
     BenchMesoReport report;
     if (options.prisms) report.prisms = compareMesoPrisms(uint64_t(options.rays));
     std::vector<MesoPublished> ofModels;
+    if (options.bases) {
+        for (const std::string& asset : assets) {
+            VCP_TRY_ASSIGN(const auto rows, compareMesoBent(asset, {.device = options.device.value_or(kHostName),
+                                                                    .repetitions = options.repetitions,
+                                                                    .progress = options.progress}));
+            report.bent.insert(report.bent.end(), rows.begin(), rows.end());
+        }
+    }
     if (options.models) {
         VCP_TRY_ASSIGN(report.models, compareMesoModels({.device = options.device.value_or(kHostName),
                                                          .repetitions = options.repetitions,

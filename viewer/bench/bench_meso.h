@@ -37,6 +37,7 @@ struct BenchMesoOptions {
     bool shadows = false;               ///< compares shadows by displacement maps with the shape's
     bool light = false;                 ///< compares light from everywhere on a tile with a path tracer
     bool prisms = false;                ///< measures what maps from prisms to tile space distort
+    bool bases = false;                 ///< measures view-dependent maps over bases that bend
     bool models = false;                ///< times frames of six models, on `device`, or by the host
     bool remesh = false;                ///< measures remeshing as well (bench_remesh.h)
     bool tessellation = false;          ///< beside the sweep, by the device's tessellator
@@ -175,6 +176,21 @@ struct MesoPrisms {
     double printedWrong = 0;  ///< part of the rays whose exit by planes, as printed, is not where they leave the prism
 };
 
+/// What a method sees of a base that bends, in one picture from outside. Rays that come into the slab are judged,
+/// against the smooth base, whose heights are parallel surfaces.
+struct MesoBent {
+    std::string asset, base, method, knob;
+    double overRadius = 0;  ///< slab heights over the base's least radius
+    uint64_t rays = 0;
+    MesoJudged shape = {};         ///< texels are 1/128 tile
+    double p50 = 0, p95 = 0;       ///< of the error of all that hit where they should, texels
+    double iterations = 0;         ///< of a ray: questions to a map, or steps
+    double fetches = 0;            ///< of a ray at most; 0: not known
+    uint64_t bytes = 0;            ///< of the arrays
+    double preprocessSeconds = 0;  ///< of the processor, all threads; 0: not known
+    double timeOverGdm = 0;        ///< of a frame, median of the rounds
+};
+
 /// Frames of a model: a base with mesostructure, drawn in local light (one lamp, with shadows) or light from
 /// everywhere.
 struct MesoModel {
@@ -219,6 +235,7 @@ struct BenchMesoReport {
     std::vector<MesoShadows> shadows;
     std::vector<MesoLight> lights;
     std::vector<MesoPrisms> prisms;
+    std::vector<MesoBent> bent;
     std::vector<MesoModel> models;
 };
 
@@ -253,6 +270,19 @@ Result<std::vector<MesoLight>> compareMesoLight(const std::string& name, const m
 
 /// Returns the processor's time of this process so far, all threads, in nanoseconds.
 inline double processorNs() { return double(std::clock()) * 1e9 / CLOCKS_PER_SEC; }
+
+struct MesoBentOptions {
+    std::string device;                 ///< as RendererOptions::device
+    int repetitions = 3;                ///< rounds over the methods
+    uint32_t across = 160, down = 120;  ///< pixels of a picture
+    int cells = 32;                     ///< points of the maps along x
+    /// Called with what is being done; false cancels. May be empty.
+    std::function<bool(const std::string& what, double part)> progress = {};
+};
+
+/// Draws a height field on a plane, cylinders, a sphere and tori by view-dependent maps of several curvatures, other
+/// displacement maps and boxes. `name`: as openMesoAsset. Errors: those of the renderer and the builders; Cancelled.
+Result<std::vector<MesoBent>> compareMesoBent(const std::string& name, const MesoBentOptions& options);
 
 /// Measures what maps of prisms distort, on tori of several curvatures and numbers of triangles.
 std::vector<MesoPrisms> compareMesoPrisms(uint64_t rays);

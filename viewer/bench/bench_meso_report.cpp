@@ -237,6 +237,24 @@ std::string benchMesoJson(const BenchMesoReport& report) {
         row["printed_exit_wrong"] = p.printedWrong;
         prisms.push_back(row);
     }
+    Json bent = Json::array();
+    for (const MesoBent& b : report.bent) {
+        Json row = {{"asset", b.asset},
+                    {"base", b.base},
+                    {"slab_over_radius", b.overRadius},
+                    {"method", b.method},
+                    {"knob", b.knob},
+                    {"rays", b.rays},
+                    {"p50_texels", b.p50},
+                    {"p95_texels", b.p95},
+                    {"iterations_mean", b.iterations},
+                    {"fetches_most", b.fetches > 0 ? Json(b.fetches) : Json()},
+                    {"bytes", b.bytes},
+                    {"preprocess_seconds", b.preprocessSeconds > 0 ? Json(b.preprocessSeconds) : Json()},
+                    {"time_over_gdm", b.timeOverGdm}};
+        for (size_t c = 0; c < kMesoClassNames.size(); ++c) row[std::string(kMesoClassNames[c])] = b.shape.fractions[c];
+        bent.push_back(row);
+    }
     Json models = Json::array();
     for (const MesoModel& m : report.models)
         models.push_back({{"asset", m.asset},
@@ -285,10 +303,19 @@ std::string benchMesoJson(const BenchMesoReport& report) {
                             {"triangles", row.triangles},
                             {"ms", row.ms},
                             {"processor_ms", row.processorMs}});
-    return Json{{"rows", rowsOf(report)}, {"headline", headlines},  {"goals", goals},
-                {"checks", checks},       {"published", published}, {"factors", factors},
-                {"shadows", shadows},     {"lights", lights},       {"prisms", prisms},
-                {"models", models},       {"remeshed", remeshed},   {"remeshed_pictures", pictures}}
+    return Json{{"rows", rowsOf(report)},
+                {"headline", headlines},
+                {"goals", goals},
+                {"checks", checks},
+                {"published", published},
+                {"factors", factors},
+                {"shadows", shadows},
+                {"lights", lights},
+                {"prisms", prisms},
+                {"bent", bent},
+                {"models", models},
+                {"remeshed", remeshed},
+                {"remeshed_pictures", pictures}}
         .dump();
 }
 
@@ -376,6 +403,22 @@ std::string benchMesoMarkdown(const BenchMesoReport& report) {
             text += fmt::format("| {:.3g}° | {:.3f} | {} | {} | {} | {} | {} | {} | {:.1f} |\n", p.turnDegrees,
                                 p.heightOverRadius, p.prisms, both(p.straight), both(p.linear), both(p.straightSmooth),
                                 both(p.linearSmooth), both(p.curvedSmooth), 100 * p.printedWrong);
+    }
+    if (!report.bent.empty()) {
+        text +=
+            "\n| asset | base | slab over radius | method | knob | rays | missed % | false % | off by 2 texels % | p50 "
+            "| "
+            "p95 texels | questions | fetches | MB | built s | time over gdm's "
+            "|\n|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n";
+        for (const MesoBent& b : report.bent)
+            text += fmt::format(
+                "| {} | {} | {:.3f} | {} | {} | {} | {:.2f} | {:.2f} | {:.2f} | {:.2f} | {:.2f} | {:.2f} | {} | {:.2f} "
+                "| "
+                "{} | {:.2f} |\n",
+                b.asset, b.base, b.overRadius, b.method, b.knob, b.rays, 100 * b.shape.fraction(MesoClass::Missed),
+                100 * b.shape.fraction(MesoClass::False), 100 * b.shape.fraction(MesoClass::WrongFeature), b.p50, b.p95,
+                b.iterations, b.fetches > 0 ? fmt::format("{:.1f}", b.fetches) : std::string(), double(b.bytes) * 1e-6,
+                b.preprocessSeconds > 0 ? fmt::format("{:.1f}", b.preprocessSeconds) : std::string(), b.timeOverGdm);
     }
     if (!report.models.empty()) {
         text +=

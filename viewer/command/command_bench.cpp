@@ -297,6 +297,9 @@ RunCommand addBenchMeso(CLI::App& bench) {
         "Also compare light from everywhere on a tile, and on two bases, in the three skies, with a path tracer");
     app->add_flag("--prisms", options.prisms,
                   "Also measure what maps from prisms to the tile distort: one line, tetrahedra, the curved path");
+    app->add_flag("--bases", options.bases,
+                  "Also measure view-dependent maps with and without curvatures, on a plane, cylinders, a sphere and "
+                  "tori, by the host or on the device");
     app->add_flag("--models", options.models,
                   "Also time frames of six models that the paper prints rates of, a covered pixel and a prism, by the "
                   "host or on the device");

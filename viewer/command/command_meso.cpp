@@ -7,7 +7,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "mesostructure/asset_file.h"
+#include "mesostructure/method.h"
 #include "mesostructure/solids.h"
 #include "viewer/asset/height_image.h"
 #include "viewer/asset/share_out.h"
@@ -35,7 +35,8 @@ struct BuildMeso {
     double cap = 0.25;
     bool onlyHeights = false, noBoxes = false, noPatches = false, overwrite = false, guesses = false,
          noVisibility = false;
-    std::string gdm, directions = "16x32";
+    std::string gdm, vdm, directions = "16x32";
+    Curvatures curvatures = MethodOptions().curvatures;
     int rank = 16, bits = 16;
     int transfer = 0;  // cells along x; 0: none
     TransferOptions traced;
@@ -89,20 +90,31 @@ Result<AssetOptions> optionsOf(const BuildMeso& c) {
     return options;
 }
 
-/// Reads what the displacement map is to be, where there is to be one; `extent` is the tile's.
-Result<std::optional<AssetOptions::Displacement>> displacementOf(const BuildMeso& c, glm::dvec3 extent) {
-    if (c.gdm.empty()) return std::optional<AssetOptions::Displacement>();
+/// Reads what a displacement map is to be, of points like `text`; `extent` is the tile's.
+Result<AssetOptions::Displacement> displacementOf(const BuildMeso& c, const std::string& text, glm::dvec3 extent) {
     AssetOptions::Displacement map{.traced = {}, .rank = c.rank, .bits = c.bits, .withVisibility = !c.noVisibility};
-    const std::vector<int> points = wholeNumbers(c.gdm, 'x'), directions = wholeNumbers(c.directions, 'x');
+    const std::vector<int> points = wholeNumbers(text, 'x'), directions = wholeNumbers(c.directions, 'x');
     if (points.size() != 1 && points.size() != 3)
-        return wrong("--gdm must be like 32 or 64x64x32, not \"" + c.gdm + "\"");
+        return wrong("--gdm and --vdm must be like 32 or 64x64x32, not \"" + text + "\"");
     if (directions.size() != 2) return wrong("--directions must be like 16x32, not \"" + c.directions + "\"");
     map.traced.points = points.size() == 3 ? glm::ivec3(points[0], points[1], points[2])
                                            : glm::ivec3(points[0], std::lround(points[0] * extent.y),
                                                         std::lround(points[0] * extent.z) + 1);
     map.traced.directions = {directions[0], directions[1]};
     map.traced.memoryBytes = c.memoryBytes;
-    return std::optional(map);
+    return map;
+}
+
+/// Adds the displacement maps that are asked for.
+Result<void> addMaps(const BuildMeso& c, glm::dvec3 extent, AssetOptions& options) {
+    if (!c.gdm.empty()) {
+        VCP_TRY_ASSIGN(options.gdm, displacementOf(c, c.gdm, extent));
+    }
+    if (c.vdm.empty()) return {};
+    VCP_TRY_ASSIGN(options.vdm, displacementOf(c, c.vdm, extent));
+    options.vdm->traced.curvatures = c.curvatures;
+    options.vdm->withVisibility = c.curvatures.samples > 1;
+    return {};
 }
 
 Result<glm::ivec3> cellsOf(const std::string& text, glm::dvec3 extent) {
@@ -169,6 +181,10 @@ Json toJson(const std::string& file, uint64_t fileBytes, const Asset& a) {
     json["gdm"] = a.gdm ? Json::array({a.gdm->table.nodes.x, a.gdm->table.nodes.y, a.gdm->table.nodes.z}) : Json();
     json["gdm_rank"] = a.gdm ? Json(a.gdm->factors ? a.gdm->factors->rank : 0) : Json();
     json["gdm_bytes"] = a.gdm ? Json(a.gdm->bytes()) : Json();
+    json["vdm"] = a.vdm ? Json::array({a.vdm->table.nodes.x, a.vdm->table.nodes.y}) : Json();
+    json["vdm_curvatures"] = a.vdm ? Json(a.vdm->table.curvatures.samples) : Json();
+    json["vdm_rank"] = a.vdm ? Json(a.vdm->factors ? a.vdm->factors->rank : 0) : Json();
+    json["vdm_bytes"] = a.vdm ? Json(a.vdm->bytes()) : Json();
     json["guess_bytes"] = a.guesses ? Json(a.guesses->bytes()) : Json();
     json["transfer"] = a.transfer ? cells(a.transfer->grid.cells) : Json();
     json["transfer_cells"] = a.transfer ? Json(a.transfer->cells()) : Json();
@@ -211,6 +227,13 @@ std::string summary(const std::string& file, uint64_t fileBytes, const Asset& a)
                             t.nodes.z, t.directions.thetas, t.directions.phis,
                             a.gdm->factors ? fmt::format("rank {}", a.gdm->factors->rank) : "all distances",
                             formatBytes(a.gdm->bytes()));
+    }
+    if (a.vdm) {
+        const DistanceTable& t = a.vdm->table;
+        text += fmt::format("\n  vdm         {} x {} points, {} x {} directions, {} curvatures, {}, {}", t.nodes.x,
+                            t.nodes.y, t.directions.thetas, t.directions.phis, t.curvatures.samples,
+                            a.vdm->factors ? fmt::format("rank {}", a.vdm->factors->rank) : "all distances",
+                            formatBytes(a.vdm->bytes()));
     }
     if (a.guesses) text += fmt::format("\n  guesses     {}", formatBytes(a.guesses->bytes()));
     if (a.transfer) {
@@ -258,7 +281,7 @@ Result<int> runBuild(const BuildMeso& command) {
     const auto shape = shapeOf(asset);
     if (!shape) return named(shape.error());
     VCP_TRY_ASSIGN(options.cells, cellsOf(command.grid, (*shape)->extent()));
-    VCP_TRY_ASSIGN(options.gdm, displacementOf(command, (*shape)->extent()));
+    VCP_TRY(addMaps(command, (*shape)->extent(), options));
     const InterruptScope catching;
     ProgressDisplay display(command.report.progressStyle(), stderr);
     const auto sharedOut = [&display](const char* stage) {
@@ -270,6 +293,7 @@ Result<int> runBuild(const BuildMeso& command) {
         };
     };
     if (options.gdm) options.gdm->traced.shareOut = sharedOut("distances");
+    if (options.vdm) options.vdm->traced.shareOut = sharedOut("view-dependent distances");
     if (options.transfer) options.transfer->shareOut = sharedOut("light");
     if (const auto built = buildAsset(asset, options); !built) return named(built.error());
     display.finish();
@@ -346,17 +370,32 @@ RunCommand addMesoBuild(CLI::App& meso) {
                     "With a generalized displacement map of so many points along x, or 64x64x32 (methods gdm, "
                     "gdm-visibility)")
         ->type_name("N");
-    app->add_option("--directions", command->directions, "Its directions: elevations x azimuths")
+    app->add_option(
+           "--vdm", command->vdm,
+           "With a view-dependent displacement map of so many points along x, over bases of several curvatures "
+           "(method vdm)")
+        ->type_name("N");
+    app->add_option("--curvatures", command->curvatures.samples,
+                    "Its curvatures of the base, an odd number; 1: of flat bases")
+        ->type_name("N")
+        ->capture_default_str()
+        ->check(CLI::Range(1, kMostCurvatureSamples));
+    app->add_option("--curvature", command->curvatures.most, "The greatest of them, slab heights over a radius")
+        ->type_name("C")
+        ->capture_default_str()
+        ->check(CLI::Range(1e-3, kMostCurvature));
+    app->add_option("--directions", command->directions, "Directions of the maps: elevations x azimuths")
         ->type_name("MxN")
         ->capture_default_str();
-    app->add_option("--rank", command->rank, "Its terms; 0 keeps all distances")
+    app->add_option("--rank", command->rank, "Their terms; 0 keeps all distances")
         ->type_name("N")
         ->capture_default_str()
         ->check(CLI::Range(0, kMostRank));
-    app->add_option("--bits", command->bits, "Bits of its values")
+    app->add_option("--bits", command->bits, "Bits of their values")
         ->capture_default_str()
         ->check(CLI::IsMember({8, 16}));
-    app->add_flag("--no-visibility", command->noVisibility, "Without the bits that say what is hit, as published");
+    app->add_flag("--no-visibility", command->noVisibility,
+                  "Without the bits of --gdm that say what is hit, as published");
     app->add_flag("--guesses", command->guesses, "With guesses of safe lengths (method gdm-safe)");
     app->add_option(
            "--transfer", command->transfer,
@@ -371,7 +410,7 @@ RunCommand addMesoBuild(CLI::App& meso) {
         ->type_name("N")
         ->capture_default_str()
         ->check(CLI::Range(1, 1 << 24));
-    addMemory(*app, command->memoryBytes, "Memory for the map's distances and for the light [1G]");
+    addMemory(*app, command->memoryBytes, "Memory for the maps' distances and for the light [1G]");
     app->add_option("--up", command->up, "The mesh's axis out of the surface")
         ->capture_default_str()
         ->check(CLI::IsMember({"x", "y", "z"}));

@@ -196,11 +196,12 @@ private:
         MesoSurfaceDescription made;
         made.method.name = "boxes";
         if (!isObject(json, at)) return made;
-        onlyKeys(json, at,
-                 {"asset",       "surface",  "subdivide",      "tiles",  "height",      "translate", "scale",  "up",
-                  "colour",      "texture",  "normal_texture", "method", "cell",        "grid",      "cones",  "steps",
-                  "refinements", "rank",     "directions",     "base",   "far",         "offset",    "filter", "path",
-                  "seconds",     "transfer", "base_transfer",  "error",  "displacement"});
+        onlyKeys(
+            json, at,
+            {"asset",       "surface",  "subdivide",      "tiles",  "height",       "translate",  "scale",    "up",
+             "colour",      "texture",  "normal_texture", "method", "cell",         "grid",       "cones",    "steps",
+             "refinements", "rank",     "directions",     "base",   "far",          "offset",     "filter",   "path",
+             "seconds",     "transfer", "base_transfer",  "error",  "displacement", "curvatures", "curvature"});
         if (json.contains("displacement")) {
             if (json.contains("asset")) wrong(at + "/asset", "does not go with \"displacement\"");
             made.displacement = named(json["displacement"], at + "/displacement", [](const auto&) { return true; });
@@ -241,6 +242,9 @@ private:
             made.method.refinements = whole(json["refinements"], at + "/refinements", kMostRefinements);
         if (json.contains("rank")) made.method.rank = upTo(json["rank"], at + "/rank", meso::kMostRank);
         if (json.contains("directions")) made.method.directions = directions(json["directions"], at + "/directions");
+        if (json.contains("curvatures"))
+            made.method.curvatures.samples = odd(json["curvatures"], at + "/curvatures", meso::kMostCurvatureSamples);
+        if (json.contains("curvature")) made.method.curvatures.most = curvature(json["curvature"], at + "/curvature");
         if (json.contains("base")) made.withBase = flag(json["base"], at + "/base");
         if (json.contains("far")) made.withFar = flag(json["far"], at + "/far");
         if (json.contains("transfer")) made.withTransfer = flag(json["transfer"], at + "/transfer");
@@ -333,6 +337,19 @@ private:
         if (!json.is_number_integer() || json < 1 || json > most)
             return wrong(at, fmt::format("must be a whole number from 1 to {}", most)), 1;
         return json.get<int>();
+    }
+
+    int odd(const Json& json, const std::string& at, int most) {
+        const int count = whole(json, at, most);
+        if (count % 2 == 0) wrong(at, fmt::format("must be an odd number from 1 to {}", most));
+        return count;
+    }
+
+    double curvature(const Json& json, const std::string& at) {
+        const double most = json.is_number() ? json.get<double>() : 0;
+        if (!(most > 0 && most <= meso::kMostCurvature))
+            wrong(at, fmt::format("must be above 0 and at most {:g} slab heights over a radius", meso::kMostCurvature));
+        return most;
     }
 
     meso::Cones cones(const Json& json, const std::string& at) {

@@ -66,6 +66,8 @@ OrderedJson surfaceJson(const MesoSurfaceDescription& surface) {
     put("rank", surface.method.rank, usual.method.rank);
     if (surface.method.directions != usual.method.directions)
         json["directions"] = OrderedJson::array({surface.method.directions.x, surface.method.directions.y});
+    put("curvatures", surface.method.curvatures.samples, usual.method.curvatures.samples);
+    put("curvature", surface.method.curvatures.most, usual.method.curvatures.most);
     put("base", surface.withBase, usual.withBase);
     put("far", surface.withFar, usual.withFar);
     put("transfer", surface.withTransfer, usual.withTransfer);

@@ -104,6 +104,9 @@ TEST(SceneFile, WhatIsWrongIsSaidWithItsLine) {
         {"", 1, "JSON"},
         {beside("\"caps\":\n 1e999"), 4, "out of range"},
         {beside("\"caps\": true,\n\"caps\": false"), 4, "\"caps\" is there twice"},
+        {beside("\"mesostructure\": [{\"asset\": \"beads\",\n\"curvatures\": 4}]"), 4,
+         "must be an odd number from 1 to 17"},
+        {beside("\"mesostructure\": [{\"asset\": \"beads\",\n\"curvature\": 0.6}]"), 4, "above 0 and at most 0.5"},
         {inDataset("\"scale\": 1e200"), 4, "must be between"},
         {inDataset("\"scale\": 1e-310"), 4, "above 0"},
         {inDataset("\"translate\": [0, -1e13, 0]"), 4, "must be between"},
@@ -154,6 +157,7 @@ TEST(SceneFile, WhatIsWrittenIsReadAgain) {
     surface.method.refinements = 2;
     surface.method.rank = 0;
     surface.method.directions = {8, 12};
+    surface.method.curvatures = {9, 0.25};
     surface.withBase = surface.withFar = false;
     surface.withTransfer = true;
     scene.lights = {{true, glm::vec3(0.6f, 0, 0.8f), 1}, {false, glm::vec3(0, 1, 0), 0.25f}};
@@ -198,6 +202,7 @@ TEST(SceneFile, WhatIsWrittenIsReadAgain) {
     EXPECT_EQ(read->surfaces[0].method.refinements, 2);
     EXPECT_EQ(read->surfaces[0].method.rank, 0);
     EXPECT_EQ(read->surfaces[0].method.directions, glm::ivec2(8, 12));
+    EXPECT_EQ(read->surfaces[0].method.curvatures, (meso::Curvatures{9, 0.25}));
     EXPECT_FALSE(read->surfaces[0].withBase || read->surfaces[0].withFar);
     EXPECT_TRUE(read->surfaces[0].withTransfer);
     ASSERT_TRUE(read->lights.size() == 2 && read->camera);
