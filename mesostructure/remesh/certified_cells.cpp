@@ -183,7 +183,6 @@ void CertifiedCells::addKinds() {
     for (const auto& [a, b] : neighbours_) isJump_.push_back(kinds_[kindOf_[a]].mayJump || kinds_[kindOf_[b]].mayJump);
 }
 
-/// Returns the level that points of cells of a step have their heights from.
 int CertifiedCells::levelOf(int step) const {
     return std::clamp(step - finest_ - kLog2TexelsOfACell, 0, patches_.heights->used() - 1);
 }

@@ -18,7 +18,11 @@
 // place. A triangle's corners lie on the surface, and between them the map has all heights from the lowest of theirs to
 // the highest, as the triangle has: each point of one is as high as some point of the other over the same triangle of
 // the base. So they are no farther apart than that is wide, along its edges in the picture, and by how much the map
-// goes beyond the corners' heights. The less of the two certificates counts.
+// goes beyond the corners' heights, or the corners are off the map where they have the heights of a coarser level. The
+// less of the two certificates counts.
+//
+// Points within a patch and along its edges have heights of the level with two texels to a cell's edge, its corners
+// those of the map. Where the map may jump, all have those of the map.
 //
 // Patches are smaller where the map is steep (height_bends.h), down to parts of a texel: their edges end where they
 // cross the lines between texels, so that within a patch nothing bends sharply.
@@ -120,7 +124,9 @@ private:
     [[nodiscard]] std::pair<double, double> rangeOf(size_t patch);
     [[nodiscard]] Seen seenIn(const View& view, size_t patch);
     [[nodiscard]] double pixels(const Seen& seen, double height, double across, const Reach& reach) const;
+    /// Returns the level that points of cells of a step have their heights from.
     [[nodiscard]] int levelOf(int step) const;
+    /// Sets the parts and the level of an edge with some step.
     void setEdge(PatchCells& cells, int side, uint32_t edge, int step) const;
     [[nodiscard]] PatchCells evenly(size_t patch, int step) const;
     void choosePixelStep(const View& view, size_t patch, Seen& seen) const;

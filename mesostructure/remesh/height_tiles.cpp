@@ -46,15 +46,11 @@ bool HeightTiles::isThere(size_t level, glm::ivec2 tile, size_t coarser, const s
     if (level == coarser) return quads[firsts_[level] + uint32_t(tile.y * tilesOf(level).x + tile.x)] != kNone;
     const glm::ivec2 first = tile * kEdge * of / size - 1,
                      last = (glm::min((tile + 1) * kEdge, size) * of - 1) / size + 1;
-    const auto tilesAlong = [&](int axis) {
-        std::vector<int> along;
-        for (int at = first[axis]; at < last[axis]; at += kEdge) along.push_back(wrapped(at, of[axis]) / kEdge);
-        along.push_back(wrapped(last[axis], of[axis]) / kEdge);
-        return along;
-    };
-    for (const int y : tilesAlong(1))
-        for (const int x : tilesAlong(0))
-            if (quads[firsts_[coarser] + uint32_t(y * tilesOf(coarser).x + x)] == kNone) return false;
+    // They are half a tile wide at most: they lie in two along an axis.
+    const int across = tilesOf(coarser).x;
+    for (const int y : {wrapped(first.y, of.y) / kEdge, wrapped(last.y, of.y) / kEdge})
+        for (const int x : {wrapped(first.x, of.x) / kEdge, wrapped(last.x, of.x) / kEdge})
+            if (quads[firsts_[coarser] + uint32_t(y * across + x)] == kNone) return false;
     return true;
 }
 

@@ -38,7 +38,7 @@ struct RemeshCamera {
 enum class HeightAccess {
     Sample,  ///< the level's height
     Most,    ///< the most of the samples over the footprint, the least where the surface is seen from behind (4.1)
-    Map,     ///< the map's own height, whatever the footprint: of certified cells (certified_cells.h)
+    Map,     ///< of certified cells (certified_cells.h): of the levels that the pieces name, whatever the footprint
 };
 
 struct RemeshOptions {

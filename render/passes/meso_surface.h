@@ -81,8 +81,8 @@ public:
     MesoSurfacePass(Device& device, MesoResources& resources)
         : device_(device), resources_(resources), raster_(device) {}
 
-    /// Replaces the surfaces; waits for nothing: no frame may be in flight. Heights take at most `heightBytes`. On an
-    /// error there are none. Errors: Device, Limit.
+    /// Replaces the surfaces: no frame may be in flight. Heights take at most `heightBytes`. On an error there are
+    /// none. Errors: Device, Limit.
     Result<void> setSurfaces(std::span<const MesoSurface> surfaces, uint64_t heightBytes);
     /// What the surfaces are drawn over.
     struct Picture {
