@@ -14,9 +14,9 @@ CONSTANT uint kRemeshPieceQuads = 15u;
 // Levels are in tiles (mesostructure/remesh/height_tiles.h). Of each level a quad: the number of the word in which its
 // first tile's entry is, its width and height, its texels in a tile unit along y. Then the entries, a word a tile, row
 // by row, level after level: the quad at which its heights begin, and above kRemeshQuadBits the level itself; where the
-// tile is not there, a coarser level, which is there wherever the tile would be, and a texel about it. Then the heights of tiles in any
-// order, eight of 16 bits a quad, the first in a word's low half. A tile has one more row and column than it is wide,
-// which are its neighbours' first.
+// tile is not there, a coarser level, which is there wherever the tile would be, and a texel about it. Then the heights
+// of tiles in any order, eight of 16 bits a quad, the first in a word's low half. A tile has one more row and column
+// than it is wide, which are its neighbours' first.
 CONSTANT int kRemeshTileShift = 7;
 CONSTANT int kRemeshTileEdge = 128;
 CONSTANT uint kRemeshTileQuads = 2081u;
