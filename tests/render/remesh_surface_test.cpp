@@ -146,6 +146,7 @@ protected:
             it.remeshed = {std::make_shared<const RemeshSurface>(
                                *buildRemeshSurface(*makeBaseSurface("quad", 1), std::move(levels), 0.1)),
                            {.errorPixels = 0.5}};
+            it.remeshed.cells = std::make_shared<CertifiedCells>(*CertifiedCells::create(*it.remeshed.surface));
             return it;
         }();
         return made;

@@ -114,7 +114,7 @@ public:
             return Error{.code = ErrorCode::Usage,
                          .message = fmt::format(
                              "{} draws nothing that moves: leave \"path\" out, or take another method", kRemeshMethod)};
-        // Certified cells take heights from the map, and of coarser levels normals alone.
+        // Certified cells measure what averages leave out.
         const bool isLarge = asset.heights->texels.size() > kMostFittedTexels;
         const LevelFit fit = d.errorPixels > 0 || isLarge ? LevelFit::Averaged : LevelFit::Least;
         auto& [levels, arrays] = levels_[{sourceOf(d), d.withFilter, fit}];

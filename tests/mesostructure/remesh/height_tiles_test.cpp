@@ -65,19 +65,19 @@ TEST(HeightTiles, EntriesNameTheFinestLevelThatIsThereAtAllTexels) {
                 if (has == level) {
                     EXPECT_EQ(entry & 0x7ffffff, quads[tile]);
                 }
+                // Of a coarser level also the texels about those that places of the tile lie in.
                 const auto isAllThere = [&](size_t in) {
-                    const glm::ivec2 first(number % along.x * kEdge, number / along.x * kEdge);
-                    const glm::ivec2 of = tiles.heights()->levels()[in].size;
+                    const glm::ivec2 low = glm::ivec2(number % along.x, number / along.x) * kEdge,
+                                     high = glm::min(low + kEdge, size), of = tiles.heights()->levels()[in].size;
                     const int about = in == level ? 0 : 1;
-                    for (int j = 2 * first.y; j < 2 * std::min(first.y + kEdge, size.y); ++j)
-                        for (int i = 2 * first.x; i < 2 * std::min(first.x + kEdge, size.x); ++i)
-                            for (const int off : {-about, about}) {
-                                const glm::ivec2 texel = glm::ivec2(i, j) * of / (2 * size) + off;
-                                const glm::ivec2 at(wrapped(texel.x, of.x) / kEdge, wrapped(texel.y, of.y) / kEdge);
-                                if (quads[tiles.first(in) + uint32_t(at.y * tilesAlong(tiles, in).x + at.x)] ==
-                                    HeightTiles::kNone)
-                                    return false;
-                            }
+                    const glm::ivec2 first = low * of / size - about, last = (high * of - 1) / size + about;
+                    for (int j = first.y; j <= last.y; ++j)
+                        for (int i = first.x; i <= last.x; ++i) {
+                            const glm::ivec2 at(wrapped(i, of.x) / kEdge, wrapped(j, of.y) / kEdge);
+                            if (quads[tiles.first(in) + uint32_t(at.y * tilesAlong(tiles, in).x + at.x)] ==
+                                HeightTiles::kNone)
+                                return false;
+                        }
                     return true;
                 };
                 for (size_t in = level; in <= has; ++in) ASSERT_EQ(isAllThere(in), in == has) << level << " " << number;
