@@ -36,7 +36,6 @@ struct SweptPiece {
     [[nodiscard]] int remeshParts(int k, int cells) const { return piece->parts[k] > 0 ? piece->parts[k] : cells; }
     [[nodiscard]] int remeshHeightLevel(int k) const { return piece->levels[k]; }
     [[nodiscard]] RemeshFootprint remeshFootprint(Real texels) { return heights.remeshFootprint(texels); }
-    [[nodiscard]] RemeshFootprint remeshFootprintOf(int level) { return heights.remeshFootprintOf(level); }
     [[nodiscard]] Real remeshHeight(const RemeshFootprint& footprint, const Real2& uv) {
         return heights.remeshHeight(footprint, uv);
     }

@@ -69,8 +69,8 @@ struct RemeshSweeping : RemeshMath<T>, Piece {
     using Math::remeshBetween, Math::remeshColumn, Math::remeshDepth, Math::remeshEdge, Math::remeshNearestPart,
         Math::remeshPart, Math::remeshPlan, Math::kRemeshMap, Math::kRemeshMost;
     using Piece::remeshAddTriangle, Piece::remeshAddVertex, Piece::remeshCell, Piece::remeshCorner,
-        Piece::remeshFootprint, Piece::remeshFootprintOf, Piece::remeshHeight, Piece::remeshHeightLevel,
-        Piece::remeshLevels, Piece::remeshMapWidth, Piece::remeshParts, Piece::remeshSeam, Piece::view;
+        Piece::remeshFootprint, Piece::remeshHeight, Piece::remeshHeightLevel, Piece::remeshLevels,
+        Piece::remeshMapWidth, Piece::remeshParts, Piece::remeshSeam, Piece::view;
     using typename Math::RemeshColumn, typename Math::RemeshCorner, typename Math::RemeshPlan,
         typename Math::RemeshSeam;
     using typename Piece::RemeshFootprint;

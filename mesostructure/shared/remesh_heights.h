@@ -55,15 +55,6 @@ struct RemeshFootprint {
     Real part;
 };
 
-// Of one level.
-INLINE RemeshFootprint remeshFootprintOf(int level) {
-    RemeshFootprint made;
-    made.fine = remeshLevel(level);
-    made.coarse = made.fine;
-    made.part = Real(0);
-    return made;
-}
-
 // `texels`: the footprint's edge, in texels.
 INLINE RemeshFootprint remeshFootprint(Real texels) {
     int top = remeshLevels() - 1;

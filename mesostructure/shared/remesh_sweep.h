@@ -32,10 +32,9 @@ INLINE Real remeshTexelsAt(Real3 position, Real density) {
     return texels;
 }
 
-// Returns what heights are taken from: for a footprint of so many texels, or the map's level.
+// Returns what heights are taken from: for a footprint of so many texels, or the map's level, whose texels are 2^level.
 INLINE RemeshFootprint remeshHeightFootprint(Real texels, int level) {
-    if (view.access == kRemeshMap) return remeshFootprintOf(level);
-    return remeshFootprint(texels);
+    return remeshFootprint(view.access == kRemeshMap ? Real(1 << level) : texels);
 }
 
 // Returns the height at a place, of a point of the base at `position`. The footprint is that of its texels.
