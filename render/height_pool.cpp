@@ -45,8 +45,8 @@ uint64_t HeightPool::bytesOfAll(const meso::HeightLevels& heights) {
     return bytesFor(tiles, tiles.count());
 }
 
-HeightPool::HeightPool(Device& device, std::shared_ptr<const meso::HeightLevels> heights, uint32_t slots)
-    : device_(device), tiles_(std::move(heights)), residency_(tiles_, slots) {}
+HeightPool::HeightPool(std::shared_ptr<const meso::HeightLevels> heights, uint32_t slots)
+    : tiles_(std::move(heights)), residency_(tiles_, slots) {}
 
 Result<std::unique_ptr<HeightPool>> HeightPool::create(Device& device,
                                                        std::shared_ptr<const meso::HeightLevels> heights,
@@ -62,7 +62,7 @@ Result<std::unique_ptr<HeightPool>> HeightPool::create(Device& device,
     const uint64_t table = bytesFor(tiles, 0);
     const auto slots =
         uint32_t(std::clamp<uint64_t>((most - std::min(table, most)) / kTileBytes, least, uint64_t{tiles.count()}));
-    std::unique_ptr<HeightPool> made(new HeightPool(device, heights, slots));
+    std::unique_ptr<HeightPool> made(new HeightPool(heights, slots));
     VCP_TRY_ASSIGN(made->pool_, PagePool::create(device, bytesFor(tiles, slots), PageAccess::TexelBuffer));
     VCP_TRY_ASSIGN(made->marks_,
                    device.createBuffer(uint64_t{4} * tiles.entry(tiles.count()),

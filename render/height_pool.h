@@ -58,7 +58,7 @@ public:
     [[nodiscard]] uint64_t version() const { return version_; }
 
 private:
-    HeightPool(Device& device, std::shared_ptr<const meso::HeightLevels> heights, uint32_t slots);
+    HeightPool(std::shared_ptr<const meso::HeightLevels> heights, uint32_t slots);
     [[nodiscard]] uint32_t quadOf(uint32_t slot) const {
         return tiles_.tableQuads() + slot * meso::HeightTiles::kQuads;
     }
@@ -66,7 +66,6 @@ private:
     Result<void> writeTile(uint32_t tile, uint32_t slot);
     Result<void> writeTable();
 
-    Device& device_;
     meso::HeightTiles tiles_;
     HeightResidency residency_;
     std::unique_ptr<PagePool> pool_;
