@@ -9,7 +9,7 @@ namespace {
 
 // Coarse levels of so many tiles are always there: a first picture has them.
 constexpr uint32_t kMostKept = 64;
-// A view of one texel and another beside it may read as many tiles of a level.
+// Room for the tiles about a place in a few levels, beside those: a near view has its finest heights.
 constexpr uint32_t kLeastRoom = 16;
 
 }  // namespace
@@ -70,7 +70,7 @@ std::vector<Wish> HeightResidency::wishes() const {
 std::optional<uint32_t> HeightResidency::take(uint32_t tile) {
     if (!planned_[tile] || slots_[tile] != kNone) return std::nullopt;
     if (free_.empty()) {
-        // Of what is there as many are planned as there is room for, but this one: another has to go.
+        // As many are planned as there is room for, and this one is not there yet: another is, and has to go.
         std::optional<uint32_t> oldest;
         for (uint32_t other = 0; other < firstKept_; ++other)
             if (slots_[other] != kNone && !planned_[other] && (!oldest || read_[other] < read_[*oldest]))

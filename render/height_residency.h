@@ -39,7 +39,7 @@ public:
     [[nodiscard]] bool hasAll() const { return there_ == slots_.size(); }
     /// Tiles that are there.
     [[nodiscard]] uint32_t there() const { return there_; }
-    /// Of what the last picture of a view read: the tiles that are still to come, and those that there is no room for.
+    /// Tiles that the last picture of a view read: those that are still to come, and those that there is no room for.
     struct Missing {
         uint32_t toCome = 0, withoutRoom = 0;
     };

@@ -19,7 +19,7 @@ namespace vcp {
 struct RemeshedSurface {
     std::shared_ptr<const meso::RemeshSurface> surface;
     meso::RemeshOptions options;
-    /// Of the surface, where an error is certified; null: its cells have one size. They remember what views measured,
+    /// The surface's cells, where an error is certified; null: all have one size. They remember what views measured,
     /// so one renderer at a time draws with them.
     std::shared_ptr<meso::CertifiedCells> cells = {};
 };

@@ -64,7 +64,7 @@ std::vector<uint32_t> oppositeEdges(const std::vector<std::array<uint32_t, 3>>& 
     std::vector<uint32_t> next(first.begin(), first.end() - 1);
     for (size_t i = 0; i < from.size(); ++i) from[next[triangles[i / 3][i % 3]]++] = uint32_t(i);
     const auto endOf = [&](uint32_t edge) { return triangles[edge / 3][(edge + 1) % 3]; };
-    // Of corners at which many meet, the edges are in the order of their ends.
+    // The edges of corners at which many meet are in the order of their ends.
     constexpr uint32_t kMany = 32;
     const auto hasMany = [&](size_t corner) { return first[corner + 1] - first[corner] > kMany; };
     const auto at = [&](size_t place) { return from.begin() + std::ptrdiff_t(place); };

@@ -187,27 +187,26 @@ int CertifiedCells::levelOf(int step) const {
     return std::clamp(step - finest_ - kLog2TexelsOfACell, 0, patches_.heights->used() - 1);
 }
 
-void CertifiedCells::setEdge(PatchCells& cells, int side, uint32_t edge, int step) const {
-    cells.parts[side] = std::max(edgeParts_[edge] >> step, 1);
-    cells.levels[side] = cells.parts[side] == 1 || isJump_[edge] ? 0 : levelOf(step);
-}
-
-PatchCells CertifiedCells::evenly(size_t patch, int step) const {
-    PatchCells cells{.step = step};
-    for (int k = 0; k < 3; ++k) setEdge(cells, k, edges_[patch][size_t(k)], step);
-    cells.levels.w = kinds_[kindOf_[patch]].mayJump ? 0 : levelOf(step);
-    return cells;
-}
-
-PatchCells CertifiedCells::cells(size_t patch) const {
+template <class StepOf>
+PatchCells CertifiedCells::cellsOf(size_t patch, const StepOf& stepOf) const {
     PatchCells cells{.step = coarsest_};
     for (int k = 0; k < 3; ++k) {
         const uint32_t edge = edges_[patch][size_t(k)];
-        cells.step = std::min(cells.step, edgeSteps_[edge]);
-        setEdge(cells, k, edge, edgeSteps_[edge]);
+        const int step = stepOf(edge);
+        cells.step = std::min(cells.step, step);
+        cells.parts[k] = std::max(edgeParts_[edge] >> step, 1);
+        cells.levels[k] = cells.parts[k] == 1 || isJump_[edge] ? 0 : levelOf(step);
     }
     cells.levels.w = kinds_[kindOf_[patch]].mayJump ? 0 : levelOf(cells.step);
     return cells;
+}
+
+PatchCells CertifiedCells::evenly(size_t patch, int step) const {
+    return cellsOf(patch, [&](uint32_t) { return step; });
+}
+
+PatchCells CertifiedCells::cells(size_t patch) const {
+    return cellsOf(patch, [&](uint32_t edge) { return edgeSteps_[edge]; });
 }
 
 std::array<glm::ivec3, 3> CertifiedCells::corners(size_t patch, int step) const {

@@ -56,7 +56,7 @@ namespace vcp::meso {
 struct PatchCells {
     int step = 0;         ///< its cells are 2^step of the finest ones wide
     glm::ivec3 parts{1};  ///< of its edges, at most as many as they have cells
-    /// Of the heights: along its edges, and within. An edge's depends on the edge alone.
+    /// Levels that heights are from: along its edges, and within. An edge's depends on the edge alone.
     glm::ivec4 levels{0};
 
     bool operator==(const PatchCells&) const = default;
@@ -126,8 +126,9 @@ private:
     [[nodiscard]] double pixels(const Seen& seen, double height, double across, const Reach& reach) const;
     /// Returns the level that points of cells of a step have their heights from.
     [[nodiscard]] int levelOf(int step) const;
-    /// Sets the parts and the level of an edge with some step.
-    void setEdge(PatchCells& cells, int side, uint32_t edge, int step) const;
+    /// Returns a patch's cells where its edges have some steps.
+    template <class StepOf>
+    [[nodiscard]] PatchCells cellsOf(size_t patch, const StepOf& stepOf) const;
     [[nodiscard]] PatchCells evenly(size_t patch, int step) const;
     void choosePixelStep(const View& view, size_t patch, Seen& seen) const;
     /// Returns the coarsest step that keeps what is allowed, and sets whether one does; else that of a pixel.

@@ -25,7 +25,7 @@ struct ShellHit {
     bool far;   // not marched: normal and light come from the appearance
     bool cut;   // of a border or a section plane: what is shown lies within the solid
     bool base;  // the base itself
-    // Of maps that are asked once for all of a ray's way through the shell: when the ray that hit came into it;
+    // When the ray that hit came into the shell, where the map is asked once for all of its way through it;
     // kMesoNoHit for other hits, which lie where they are found.
     float asked;
     float border;  // when the ray first leaves such a shell by its border; kMesoNoHit

@@ -13,6 +13,7 @@
 #include <cstdint>
 #include <ctime>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -20,6 +21,7 @@
 
 #include "mesostructure/asset_file.h"
 #include "octree/io/result.h"
+#include "render/picture_renderer.h"
 
 namespace vcp {
 
@@ -270,6 +272,16 @@ Result<std::vector<MesoLight>> compareMesoLight(const std::string& name, const m
 
 /// Returns the processor's time of this process so far, all threads, in nanoseconds.
 inline double processorNs() { return double(std::clock()) * 1e9 / CLOCKS_PER_SEC; }
+
+/// Returns a renderer that shows one surface. `device`: as RendererOptions::device. Errors: the renderer's.
+Result<std::unique_ptr<PictureRenderer>> rendererOf(const MesoSurface& surface, const std::string& device);
+
+struct TimedFrame {
+    FrameStats stats;
+    double ns = 0;  ///< of the processor on software devices, else of the device
+};
+/// Draws a picture of what is there. Errors: the renderer's.
+Result<TimedFrame> timedFrame(PictureRenderer& renderer, const FrameRequest& request);
 
 struct MesoBentOptions {
     std::string device;                 ///< as RendererOptions::device

@@ -269,20 +269,14 @@ Result<Drawn> drawnOn(const BentBase& base, const Asset& asset, const BentMethod
         ++drawn.queryFetches;
     drawn.request.width = options.across, drawn.request.height = options.down;
     drawn.request.camera = base.camera;
-    RendererOptions with;
-    with.device = options.device;
-    VCP_TRY_ASSIGN(drawn.renderer, createPictureRenderer(with));
-    VCP_TRY(drawn.renderer->setSurfaces(std::span(&surface, 1)));
+    VCP_TRY_ASSIGN(drawn.renderer, rendererOf(surface, options.device));
     return drawn;
 }
 
 /// Draws a picture once; counted are those after the first.
 Result<void> draw(Drawn& drawn, bool isCounted) {
-    VCP_TRY(drawn.renderer->update(drawn.request));
-    const double start = processorNs();
-    VCP_TRY_ASSIGN(const auto stats, drawn.renderer->render(drawn.request));
-    const double ns = drawn.renderer->device().software ? processorNs() - start : 1e6 * stats.msFrame;
-    if (isCounted) drawn.ns.push_back(ns);
+    VCP_TRY_ASSIGN(const auto frame, timedFrame(*drawn.renderer, drawn.request));
+    if (isCounted) drawn.ns.push_back(frame.ns);
     return {};
 }
 

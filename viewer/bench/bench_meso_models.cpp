@@ -151,22 +151,15 @@ Result<Drawn> drawnBy(const Subject& subject, const Transferred* light, const Me
         request.shading.lightDirection = glm::normalize(glm::vec3(0.5f, -0.4f, 0.75f));
         request.shading.shadows = true;
     }
-    RendererOptions with;
-    with.device = options.device;
-    VCP_TRY_ASSIGN(drawn.renderer, createPictureRenderer(with));
-    VCP_TRY(drawn.renderer->setSurfaces(std::span(&surface, 1)));
+    VCP_TRY_ASSIGN(drawn.renderer, rendererOf(surface, options.device));
     return drawn;
 }
 
 Result<void> draw(Drawn& drawn, bool isCounted) {
-    VCP_TRY(drawn.renderer->update(drawn.request));
-    const double start = processorNs();
-    VCP_TRY_ASSIGN(const auto stats, drawn.renderer->render(drawn.request));
-    const bool isProcessor = drawn.renderer->device().software;
-    const double ns = isProcessor ? processorNs() - start : 1e6 * stats.msFrame;
-    drawn.row.pixels = stats.hitPixels, drawn.row.unresolved = stats.unresolvedRays;
+    VCP_TRY_ASSIGN(const auto frame, timedFrame(*drawn.renderer, drawn.request));
+    drawn.row.pixels = frame.stats.hitPixels, drawn.row.unresolved = frame.stats.unresolvedRays;
     drawn.row.device = drawn.renderer->device().name;
-    if (isCounted) drawn.ns.push_back(ns);
+    if (isCounted) drawn.ns.push_back(frame.ns);
     return {};
 }
 
@@ -228,6 +221,21 @@ void compareRates(const std::vector<Drawn>& all, std::vector<MesoPublished>& pub
 }
 
 }  // namespace
+
+Result<std::unique_ptr<PictureRenderer>> rendererOf(const MesoSurface& surface, const std::string& device) {
+    RendererOptions options;
+    options.device = device;
+    VCP_TRY_ASSIGN(auto renderer, createPictureRenderer(options));
+    VCP_TRY(renderer->setSurfaces(std::span(&surface, 1)));
+    return renderer;
+}
+
+Result<TimedFrame> timedFrame(PictureRenderer& renderer, const FrameRequest& request) {
+    VCP_TRY(renderer.update(request));
+    const double start = processorNs();
+    VCP_TRY_ASSIGN(const auto stats, renderer.render(request));
+    return TimedFrame{stats, renderer.device().software ? processorNs() - start : 1e6 * stats.msFrame};
+}
 
 Result<std::vector<MesoModel>> compareMesoModels(const MesoModelOptions& options,
                                                  std::vector<MesoPublished>& published) {

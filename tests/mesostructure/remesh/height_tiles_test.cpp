@@ -65,7 +65,7 @@ TEST(HeightTiles, EntriesNameTheFinestLevelThatIsThereAtAllTexels) {
                 if (has == level) {
                     EXPECT_EQ(entry & 0x7ffffff, quads[tile]);
                 }
-                // Of a coarser level also the texels about those that places of the tile lie in.
+                // A coarser level must have the texels about those that places of the tile lie in, too.
                 const auto isAllThere = [&](size_t in) {
                     const glm::ivec2 low = glm::ivec2(number % along.x, number / along.x) * kEdge,
                                      high = glm::min(low + kEdge, size), of = tiles.heights()->levels()[in].size;
