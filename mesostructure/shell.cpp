@@ -1,10 +1,12 @@
 #include "mesostructure/shell.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <map>
-#include <numeric>
+#include <span>
+#include <utility>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
@@ -230,46 +232,136 @@ private:
     std::vector<double> reaches_;  // of the columns, parts of the height
 };
 
-/// Halves the pieces at the median of their middles, along the longest axis.
+struct Box {
+    dvec3 low{std::numeric_limits<double>::infinity()}, high = -low;
+
+    void add(dvec3 lower, dvec3 upper) { low = glm::min(low, lower), high = glm::max(high, upper); }
+    void add(const Box& other) { add(other.low, other.high); }
+    [[nodiscard]] dvec3 middle() const { return 0.5 * (low + high); }
+    /// Returns half the area of its sides.
+    [[nodiscard]] double area() const {
+        const dvec3 size = glm::max(high - low, dvec3(0));
+        return size.x * size.y + size.y * size.z + size.z * size.x;
+    }
+};
+
+/// Makes the tree over prisms, whose pieces follow each other: a prism a leaf. Splits lie where the areas of both
+/// sides' boxes, each times its number of prisms, have the least sum (Wald 2007: by bins of middles).
 class TreeMaker {
 public:
-    TreeMaker(const std::vector<Piece>& pieces, std::vector<uint32_t>& order) : pieces_(pieces), order_(order) {}
+    explicit TreeMaker(const std::vector<Piece>& pieces) {
+        for (size_t first = 0, last = 0; first < pieces.size(); first = last) {
+            Prism prism;
+            prism.first = uint32_t(first);
+            do prism.box.add(pieces[last].low(), pieces[last].high());
+            while (++last < pieces.size() && isSamePrism(pieces[last - 1], pieces[last]));
+            prism.pieces = uint32_t(last - first);
+            prisms_.push_back(prism);
+        }
+    }
 
-    std::vector<glm::vec4> nodes() {
+    /// Returns the nodes; appends the pieces' numbers in the order in which leaves have them.
+    std::vector<glm::vec4> nodes(std::vector<uint32_t>& order) {
         texels_.resize(Shell::kNodeTexels);
-        make(0, 0, order_.size());
+        make(0, prisms_, 0, order);
         return std::move(texels_);
     }
 
 private:
-    void make(size_t node, size_t first, size_t last) {
-        dvec3 low(std::numeric_limits<double>::infinity()), high = -low, lowMiddle = low, highMiddle = high;
-        for (size_t i = first; i < last; ++i) {
-            const Piece& piece = pieces_[order_[i]];
-            low = glm::min(low, piece.low()), high = glm::max(high, piece.high());
-            lowMiddle = glm::min(lowMiddle, middle(piece)), highMiddle = glm::max(highMiddle, middle(piece));
-        }
-        // Boxes are widened by more than single precision rounds.
-        const dvec3 slack = 1e-6 * (glm::abs(low) + glm::abs(high)) + 1e-5 * (high - low);
-        low -= slack, high += slack;
-        const bool isLeaf = last - first <= Shell::kMostInLeaf;
-        const size_t children = texels_.size() / Shell::kNodeTexels;
-        texels_[2 * node] = glm::vec4(low, float(isLeaf ? first : children));
-        texels_[2 * node + 1] = glm::vec4(high, float(isLeaf ? last - first : 0));
-        if (isLeaf) return;
-        texels_.resize(texels_.size() + 2 * Shell::kNodeTexels);
-        const dvec3 size = highMiddle - lowMiddle;
-        const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
-        const auto half = order_.begin() + std::ptrdiff_t((first + last) / 2);
-        std::nth_element(order_.begin() + std::ptrdiff_t(first), half, order_.begin() + std::ptrdiff_t(last),
-                         [&](uint32_t a, uint32_t b) { return middle(pieces_[a])[axis] < middle(pieces_[b])[axis]; });
-        make(children, first, (first + last) / 2);
-        make(children + 1, (first + last) / 2, last);
-    }
-    static dvec3 middle(const Piece& piece) { return piece.low() + piece.high(); }
+    struct Prism {
+        uint32_t first = 0, pieces = 0;
+        Box box;
+    };
+    using Prisms = std::span<Prism>;
 
-    const std::vector<Piece>& pieces_;
-    std::vector<uint32_t>& order_;
+    static constexpr int kBins = 16;
+
+    /// Whether a piece belongs to the prism of the piece before it.
+    static bool isSamePrism(const Piece& before, const Piece& piece) {
+        const auto partOf = [](const Piece& of) { return of.bits >> f32::kShellPart & 3u; };
+        return piece.columns == before.columns && partOf(piece) > partOf(before);
+    }
+
+    void make(size_t node, Prisms prisms, uint32_t depth, std::vector<uint32_t>& order) {
+        Box box;
+        for (const Prism& prism : prisms) box.add(prism.box);
+        // Boxes are widened by more than single precision rounds.
+        const dvec3 slack = 1e-6 * (glm::abs(box.low) + glm::abs(box.high)) + 1e-5 * (box.high - box.low);
+        const bool isLeaf = prisms.size() == 1;
+        const size_t children = texels_.size() / Shell::kNodeTexels;
+        texels_[2 * node] = glm::vec4(box.low - slack, float(isLeaf ? order.size() : children));
+        texels_[2 * node + 1] = glm::vec4(box.high + slack, float(isLeaf ? prisms[0].pieces : 0));
+        if (isLeaf) {
+            // The upper piece comes first, as most rays come to it first: what they hit there spares them the others.
+            for (uint32_t i = prisms[0].pieces; i-- > 0;) order.push_back(prisms[0].first + i);
+            return;
+        }
+        texels_.resize(texels_.size() + 2 * Shell::kNodeTexels);
+        const size_t half = split(prisms, depth);
+        make(children, prisms.first(half), depth + 1, order);
+        make(children + 1, prisms.subspan(half), depth + 1, order);
+    }
+
+    /// Puts the prisms of the first side first. Returns how many these are.
+    static size_t split(Prisms prisms, uint32_t depth) {
+        Box middles;
+        for (const Prism& prism : prisms) middles.add(prism.box.middle(), prism.box.middle());
+        // Halves keep the tree within the depth that casting has room for.
+        const bool isDeep = depth + uint32_t(std::bit_width(prisms.size())) >= Shell::kDepth - 2;
+        const auto [axis, plane] = isDeep ? std::pair(0, 0) : leastPlane(prisms, middles);
+        if (plane > 0) {
+            const auto second = std::partition(prisms.begin(), prisms.end(),
+                                               [&](const Prism& prism) { return binOf(prism, middles, axis) < plane; });
+            return size_t(second - prisms.begin());
+        }
+        const dvec3 size = middles.high - middles.low;
+        const int longest = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
+        const size_t half = prisms.size() / 2;
+        std::nth_element(
+            prisms.begin(), prisms.begin() + std::ptrdiff_t(half), prisms.end(),
+            [&](const Prism& a, const Prism& b) { return a.box.middle()[longest] < b.box.middle()[longest]; });
+        return half;
+    }
+
+    /// Returns the best plane: its axis, and the first bin behind it; 0: there is none.
+    static std::pair<int, int> leastPlane(Prisms prisms, const Box& middles) {
+        std::pair<int, int> best{0, 0};
+        double least = std::numeric_limits<double>::infinity();
+        for (int axis = 0; axis < 3; ++axis) {
+            if (!(middles.high[axis] > middles.low[axis])) continue;
+            std::array<Box, kBins> boxes;
+            std::array<size_t, kBins> counts{};
+            for (const Prism& prism : prisms) {
+                const auto bin = size_t(binOf(prism, middles, axis));
+                boxes[bin].add(prism.box);
+                ++counts[bin];
+            }
+            std::array<double, kBins> behind{};  // of the bins from here on
+            Box box;
+            size_t count = 0;
+            for (size_t bin = kBins; bin-- > 1;) {
+                box.add(boxes[bin]);
+                count += counts[bin];
+                behind[bin] = count > 0 ? double(count) * box.area() : std::numeric_limits<double>::infinity();
+            }
+            box = {};
+            count = 0;
+            for (size_t bin = 1; bin < kBins; ++bin) {
+                box.add(boxes[bin - 1]);
+                count += counts[bin - 1];
+                const double cost = count > 0 ? double(count) * box.area() + behind[bin] : least;
+                if (cost < least) least = cost, best = {axis, int(bin)};
+            }
+        }
+        return best;
+    }
+
+    static int binOf(const Prism& prism, const Box& middles, int axis) {
+        const double part = (prism.box.middle()[axis] - middles.low[axis]) / (middles.high[axis] - middles.low[axis]);
+        return std::clamp(int(part * kBins), 0, kBins - 1);
+    }
+
+    std::vector<Prism> prisms_;
     std::vector<glm::vec4> texels_;
 };
 
@@ -377,9 +469,8 @@ Result<Shell> buildShell(const BaseSurface& surface, double height, dvec3 extent
         return fail(ErrorCode::InvalidInput, shell.flat > 0
                                                  ? "all faces lie on their own backs: the surface has no outside"
                                                  : "no triangle has an area");
-    std::vector<uint32_t> order(pieces.size());
-    std::iota(order.begin(), order.end(), 0u);
-    shell.texels = TreeMaker(pieces, order).nodes();
+    std::vector<uint32_t> order;
+    shell.texels = TreeMaker(pieces).nodes(order);
     shell.nodes = uint32_t(shell.texels.size() / Shell::kNodeTexels);
     shell.pieces = uint32_t(pieces.size());
     shell.low = shell.origin + dvec3(shell.texels[0]), shell.high = shell.origin + dvec3(shell.texels[1]);

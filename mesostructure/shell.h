@@ -31,7 +31,7 @@ namespace vcp::meso {
 
 struct Shell {
     static constexpr uint32_t kNodeTexels = f32::kShellNodeTexels, kPieceTexels = f32::kShellPieceTexels,
-                              kMostInLeaf = 4, kDepth = f32::kShellDepth;
+                              kDepth = f32::kShellDepth;
 
     glm::dvec3 origin{0};        ///< what all coordinates are relative to: the middle of the base
     glm::dvec3 low{0}, high{0};  ///< box of the shell, world

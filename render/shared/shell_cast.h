@@ -57,21 +57,26 @@ INLINE bool passesPiece(uint piece, vec3 o, vec3 d, float start, float tMax, INO
     vec3 a3 = vec3(dot(r0, p), dot(r1, p), dot(r2, p)), b3 = vec3(dot(r0, d), dot(r1, d), dot(r2, d));
     vec4 a = vec4(1.0f - a3.x - a3.y - a3.z, a3), b = vec4(-b3.x - b3.y - b3.z, b3);
     vec3 size = abs(o) + abs(v0), lost = kRounding * vec3(dot(abs(r0), size), dot(abs(r1), size), dot(abs(r2), size));
-    a += max(vec4(lost.x + lost.y + lost.z, lost), vec4(kPieceSlack));
+    vec4 slack = max(vec4(lost.x + lost.y + lost.z, lost), vec4(kPieceSlack));
+    a += slack;
     // The passage begins at the eye at the earliest: the piece may reach out of the box whose wall `o` is on.
     passage.at = at;
     passage.enter = -start;
     passage.leave = tMax - start;
     passage.entered = -1;
     passage.left = -1;
+    passage.early = 0.0f;
+    passage.late = 0.0f;
     passage.toBase = false;
     for (int i = 0; i < 4; i++) {
         float time = -a[i] / b[i];
         if (b[i] > 0.0f && time > passage.enter) {
             passage.entered = i;
             passage.enter = time;
+            passage.early = slack[i] / b[i];
         } else if (b[i] < 0.0f && time < passage.leave) {
             passage.left = i;
+            passage.late = -slack[i] / b[i];
             passage.toBase = i == 3 && (uint(corner.w) & kShellBaseFace) != 0u;
             passage.leave = time;
         } else if (b[i] == 0.0f && a[i] < 0.0f)
@@ -146,7 +151,9 @@ INLINE void askBent(ShellPassage passage, MesoRay ray, vec3 place, float scale, 
     ray.tMax = whole ? kMostReach : ray.tMax * longer;
     MesoResult found = marchMeso(ray);
     best.iterations += found.iterations;
-    float asked = start + passage.enter, t = asked + found.t / (scale * longer);
+    // By twice what the piece is wider than it is, it is asked behind the wall of the piece that the ray has left.
+    float begins = start + passage.enter, asked = begins + 2.0f * passage.early,
+          t = begins + found.t / (scale * longer);
     // The base lies behind whatever is seen over it, however far off that is said to be.
     if (found.state != kMesoHit || !(t < best.t || (best.base && asked < best.t))) return;
     if (best.border > asked && best.border < t) return;
@@ -158,7 +165,7 @@ INLINE void askBent(ShellPassage passage, MesoRay ray, vec3 place, float scale, 
 
 // A ray leaves a smooth shell by its border: what was seen beyond is not there.
 INLINE void leaveBent(ShellPassage passage, float start, INOUT(ShellHit) best) {
-    float t = start + passage.leave;
+    float t = start + passage.leave - passage.late;
     best.border = min(best.border, t);
     if (best.asked < t && t < best.t) hitShell(kMesoNoHit, vec3(0.0f), 0, false, best);
 }
@@ -235,10 +242,11 @@ INLINE void castPiece(ShellPassage passage, vec3 o, vec3 d, float start, INOUT(S
     if (passage.toBase && view.withBase != 0u) hitBase(start + passage.leave, vec3(r2), at, best);
 }
 
-INLINE float boxEntry(uint node, vec3 o, vec3 inverse, float leave, INOUT(vec4) low, INOUT(vec4) high) {
-    low = fetchInput(int(kShellNodeTexels * node));
-    high = fetchInput(int(kShellNodeTexels * node + 1u));
-    vec3 a = (vec3(low) - o) * inverse, b = (vec3(high) - o) * inverse, near = min(a, b), far = max(a, b);
+// Returns when a ray comes into a node's box; kMesoNoHit where it does not, or after `leave`.
+INLINE float boxEntry(uint node, vec3 o, vec3 inverse, float leave) {
+    vec3 low = vec3(fetchInput(int(kShellNodeTexels * node))),
+         high = vec3(fetchInput(int(kShellNodeTexels * node + 1u)));
+    vec3 a = (low - o) * inverse, b = (high - o) * inverse, near = min(a, b), far = max(a, b);
     float first = max(0.0f, max(near.x, max(near.y, near.z))), last = min(leave, min(far.x, min(far.y, far.z)));
     return first <= last ? first : kMesoNoHit;
 }
@@ -257,13 +265,14 @@ INLINE ShellHit castShell(vec3 eye, vec3 d, float tMax) {
     best.border = kMesoNoHit;
     hitShell(tMax, vec3(0.0f), 0, false, best);
     vec3 inverse = 1.0f / mix(d, vec3(1e-18f), lessThan(abs(d), vec3(1e-18f)));
-    vec4 low, high;
-    float start = boxEntry(0u, eye, inverse, tMax, low, high);
+    float start = boxEntry(0u, eye, inverse, tMax);
     if (start >= kMesoNoHit) return best;
     // The ray starts at the shell's box, where numbers are small.
     vec3 o = eye + start * d;
     uint stack[kShellDepth];
+    float entries[kShellDepth];  // when the ray comes into the box of each, from `o` on
     stack[0] = 0u;
+    entries[0] = 0.0f;
     int depth = 1;
     uint piece = 0u, left = 0u, visits = 0u;
     // All rays of a group look for their next piece, then all march: a piece takes long, and would otherwise run for
@@ -280,21 +289,27 @@ INLINE ShellHit castShell(vec3 eye, vec3 d, float tMax) {
                 continue;
             }
             uint node = stack[--depth];
-            if (boxEntry(node, o, inverse, best.t - start, low, high) >= kMesoNoHit) continue;
-            uint first = uint(low.w), pieces = uint(high.w);
+            if (entries[depth] > best.t - start) continue;
+            uint first = uint(fetchInput(int(kShellNodeTexels * node)).w),
+                 pieces = uint(fetchInput(int(kShellNodeTexels * node + 1u)).w);
             if (pieces > 0u) {
                 piece = first;
                 left = pieces;
                 continue;
             }
             uint child = first;
-            vec4 l, h;
-            float e0 = boxEntry(child, o, inverse, best.t - start, l, h),
-                  e1 = boxEntry(child + 1u, o, inverse, best.t - start, l, h);
+            float e0 = boxEntry(child, o, inverse, best.t - start),
+                  e1 = boxEntry(child + 1u, o, inverse, best.t - start);
             // The nearer child goes on top.
             uint swapped = e1 < e0 ? 1u : 0u;
-            if (max(e0, e1) < kMesoNoHit) stack[depth++] = child + 1u - swapped;
-            if (min(e0, e1) < kMesoNoHit) stack[depth++] = child + swapped;
+            if (max(e0, e1) < kMesoNoHit) {
+                stack[depth] = child + 1u - swapped;
+                entries[depth++] = max(e0, e1);
+            }
+            if (min(e0, e1) < kMesoNoHit) {
+                stack[depth] = child + swapped;
+                entries[depth++] = min(e0, e1);
+            }
         }
         if (passes) castPiece(passage, o, d, start, best);
         if (kShadow != 0u && best.t < tMax) return best;

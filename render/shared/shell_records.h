@@ -35,8 +35,9 @@ struct ShellHit {
 struct ShellPassage {
     int at;  // texel of the piece
     float enter, leave;
-    int entered;  // the corner opposite to the face that it comes in by; -1: it starts within
-    int left;     // that opposite to the face that it leaves by; -1: it ends within
+    float early, late;  // by how much it is met before it and after it, for it is met a little wider than it is
+    int entered;        // the corner opposite to the face that it comes in by; -1: it starts within
+    int left;           // that opposite to the face that it leaves by; -1: it ends within
     bool toBase;
 };
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <random>
 
@@ -83,6 +84,37 @@ TEST(Shell, PiecesFillTheShellOnce) {
             inside += least > 0;
         }
         EXPECT_TRUE(onWall || inside == (far > 1 && far < 1.2f ? 1 : 0)) << "point " << i << " is in " << inside;
+    }
+}
+
+TEST(Shell, TheTreeHasEachPieceInOneLeafAndFitsTheStack) {
+    // Triangles each eleven times as large as the one before: areas part them two by two.
+    BaseSurface fan;
+    for (int i = 0; i < 36; ++i) {
+        const double x = std::exp2(3.5 * i - 100);
+        const auto first = uint32_t(fan.positions.size());
+        fan.positions.insert(fan.positions.end(), {{x, 0, 0}, {1.01 * x, 0, 0}, {x, 0.01 * x, 0}});
+        fan.triangles.push_back({first, first + 1, first + 2});
+        fan.uvs.push_back({glm::dvec2(0, 0), glm::dvec2(1, 0), glm::dvec2(0, 1)});
+    }
+    for (const BaseSurface& surface : {base("torus", 4), base("teapot"), fan}) {
+        const auto built = buildShell(surface, 0.01, kTile);
+        ASSERT_TRUE(built) << built.error().line();
+        const Shell& shell = *built;
+        std::vector<int> uses(shell.pieces);
+        uint32_t deepest = 0;
+        const std::function<void(uint32_t, uint32_t)> visit = [&](uint32_t node, uint32_t depth) {
+            deepest = std::max(deepest, depth);
+            const auto first = uint32_t(shell.texels[2 * node].w), count = uint32_t(shell.texels[2 * node + 1].w);
+            for (uint32_t i = 0; i < count; ++i) ++uses[first + i];
+            EXPECT_LE(count, 3u);
+            if (count > 0) return;
+            visit(first, depth + 1);
+            visit(first + 1, depth + 1);
+        };
+        visit(0, 0);
+        EXPECT_EQ(std::ranges::count(uses, 1), std::ptrdiff_t(shell.pieces));
+        EXPECT_LT(deepest, Shell::kDepth - 1);
     }
 }
 
