@@ -11,6 +11,7 @@
 #include <nlohmann/json.hpp>
 
 #include "builder/measure/quantile.h"
+#include "viewer/scene/environment.h"
 
 namespace vcp {
 
@@ -64,15 +65,17 @@ private:
 
 double MotionReport::quantileMs(double part) const { return quantile(frameMs, part); }
 
-Result<MotionReport> measureMotion(std::vector<PlacedDataset> datasets, const Box& bounds,
-                                   const MotionOptions& options) {
+Result<MotionReport> measureMotion(const OpenedScene& scene, const MotionOptions& options) {
     ViewerOptions viewerOptions = options.viewer;
     viewerOptions.framesAhead = true;
+    setSceneLight(viewerOptions.shading, scene, options.viewer.shading);
+    const Box bounds = scene.bounds();
     VCP_TRY_ASSIGN(auto viewer, Viewer::create(viewerOptions));
     OrbitCamera start;
     start.look(View::Front, bounds, options.size);
+    if (scene.file.camera) start = *scene.file.camera;
     viewer->resize(options.size);
-    VCP_TRY(viewer->open(std::move(datasets), {}, start, "motion"));
+    VCP_TRY(viewer->open(scene.placed(), scene.surfaces, start, "motion"));
     Motion motion(*viewer, options);
     VCP_TRY(motion.settle());
     MotionReport report;

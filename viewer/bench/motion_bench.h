@@ -1,4 +1,4 @@
-// Measures frames in motion: a Viewer is driven as a window drives it, while the camera turns once about the dataset
+// Measures frames in motion: a Viewer is driven as a window drives it, while the camera turns once about what is shown
 // and comes as near as a third of the distance; by the wall clock, without a window and without showing the pictures.
 //
 // The measurement follows the machine: each frame shows the time that has passed, so a slow machine draws fewer. All
@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "viewer/scene/scene_opening.h"
 #include "viewer/viewer.h"
 
 namespace vcp {
@@ -37,9 +38,9 @@ struct MotionReport {
     [[nodiscard]] double quantileMs(double part) const;
 };
 
-/// Runs the measurement. Errors: those of Viewer; Cancelled.
-Result<MotionReport> measureMotion(std::vector<PlacedDataset> datasets, const Box& bounds,
-                                   const MotionOptions& options);
+/// Runs the measurement, from the scene's own camera where it has one, else from the front. Errors: those of Viewer;
+/// Cancelled.
+Result<MotionReport> measureMotion(const OpenedScene& scene, const MotionOptions& options);
 
 std::string motionJson(const MotionReport& report);
 std::string motionText(const MotionReport& report);

@@ -9,6 +9,7 @@
 #include "viewer/bench/motion_bench.h"
 #include "viewer/bench/stress/stress.h"
 #include "viewer/bench/stress/stress_path.h"
+#include "viewer/command/build_arguments.h"
 #include "viewer/command/commands.h"
 #include "viewer/command/parsed_option.h"
 #include "viewer/command/source_arguments.h"
@@ -74,25 +75,30 @@ StressOptions optionsFor(const StressCommand& command, const OpenDataset& open) 
     return options;
 }
 
-Result<int> runMotion(const StressCommand& command, const OpenDataset& open, const RendererOptions& renderer) {
+Result<int> runMotion(const StressCommand& command) {
+    VCP_TRY_ASSIGN(const auto open,
+                   openSceneShown({command.file}, {}, command.source, command.report.progressStyle(), {}));
     MotionOptions options;
-    options.viewer.renderer = renderer;
-    options.viewer.renderer.hostRays = leavesRaysToHost(renderer.device);  // as in the window
+    options.viewer.renderer.device = command.device;
+    options.viewer.renderer.budgetBytes = command.budgetBytes;
+    options.viewer.renderer.ramBytes = command.ramBytes;
+    options.viewer.renderer.order = command.orders[0];
+    options.viewer.renderer.hostRays = leavesRaysToHost(command.device);  // as in the window
     options.viewer.errorPixels = command.errorPixels;
     options.size = command.size;
     options.seconds = command.motionSeconds;
     options.cancel = interrupted;
-    VCP_TRY_ASSIGN(const auto report, measureMotion({{open.dataset, open.source, {}}}, open.bounds(), options));
+    VCP_TRY_ASSIGN(const auto report, measureMotion(open, options));
     VCP_TRY(command.report.json ? printJsonText(motionJson(report)) : printLine(motionText(report)));
     return 0;
 }
 
 Result<int> run(const StressCommand& command) {
     const InterruptScope catching;
+    if (command.motionSeconds > 0) return runMotion(command);
     const auto start = std::chrono::steady_clock::now();
     VCP_TRY_ASSIGN(const auto open, openDataset(command.file, command.source));
     StressOptions options = optionsFor(command, open);
-    if (command.motionSeconds > 0) return runMotion(command, open, options.renderer);
     options.openSeconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     ProgressDisplay display(command.report.progressStyle(), stderr);
     options.progress = [&](const std::string& what, double fraction) {
@@ -114,7 +120,9 @@ Command addStress(CLI::App& vcp) {
     auto command = std::make_shared<StressCommand>();
     CLI::App* app =
         vcp.add_subcommand("stress", "Stream under budgets and faults along a camera path, and check every invariant");
-    app->add_option("FILE", command->file, "A .vcp file, a folder of shards, or the http(s) address of either")
+    app->add_option("FILE", command->file,
+                    "A .vcp file, a folder of shards, or the http(s) address of either; with --motion "
+                    "also a scene file (.json) or a mesh")
         ->type_name("")
         ->required();
     app->add_option("--path", command->path,
@@ -155,7 +163,7 @@ Command addStress(CLI::App& vcp) {
         ->capture_default_str()
         ->check(CLI::Range(0.01, 1000.0));
     CLI::Option* motion = app->add_option("--motion", command->motionSeconds,
-                                          "Instead: turn once about the dataset in so many seconds, as the window "
+                                          "Instead: turn once about what is shown in so many seconds, as the window "
                                           "draws it (smaller while it is slow), and count frames by size")
                               ->type_name("SECONDS")
                               ->check(CLI::Range(0.1, 3600.0));

@@ -270,7 +270,7 @@ void Interface::layOutStatus() {
         parts.emplace_back("Click a point to annotate", palette.accent);
     if (viewer.isOpen()) {
         parts.emplace_back(stateText(), status.detail == Detail::Budget ? palette.problem : palette.ink);
-        if (status.detail == Detail::Settled && status.update.drawable)
+        if (status.detail == Detail::Settled && status.update.drawable && status.levels > 0)
             parts.emplace_back(offText(status.update), palette.dim);
         const uint32_t most = std::max(viewer.mostSamples(), status.samples);
         if (most > 1) parts.emplace_back(fmt::format("Samples {} of {}", status.samples, most), palette.dim);

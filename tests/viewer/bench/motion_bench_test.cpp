@@ -1,6 +1,8 @@
 // The figures of a motion follow from its frames; that there are frames of the sizes that were asked for.
 #include "viewer/bench/motion_bench.h"
 
+#include <fstream>
+
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
@@ -34,21 +36,38 @@ TEST(MotionBench, SlowFramesAreSmaller) {
     build.inputs = {folder / "ball.ply"};
     build.output = folder / "ball.vcp";
     ASSERT_TRUE(buildOctree(build));
-    const auto reader = openFile(folder / "ball.vcp").value();
-    const auto dataset = std::make_shared<const Dataset>(readDataset(*reader).value());
+    const auto scene = openScene({folder / "ball.vcp"}, {}, {});
+    ASSERT_TRUE(scene) << scene.error().line();
     MotionOptions options;
     options.size = {64, 48};
     options.seconds = 1.5;
     options.viewer.movingFrameMs = 1e-6;
     options.viewer.renderer.budgetBytes = 16 << 20;
-    const PlacedDataset placed{dataset, std::make_shared<FilePageSource>(reader, dataset), {}};
-    const auto report = measureMotion({placed}, {{-1, -1, -1}, {1, 1, 1}}, options);
+    const auto report = measureMotion(*scene, options);
     ASSERT_TRUE(report) << report.error().line();
     ASSERT_GT(report->frameMs.size(), 0u);
     EXPECT_GT(report->byReduction.count(8), 0u);
     EXPECT_TRUE(report->fullSizeAfterMs) << "full size never came back";
     options.cancel = [] { return true; };
-    EXPECT_EQ(measureMotion({placed}, {{-1, -1, -1}, {1, 1, 1}}, options).error().code, ErrorCode::Cancelled);
+    EXPECT_EQ(measureMotion(*scene, options).error().code, ErrorCode::Cancelled);
+}
+
+TEST(MotionBench, ScenesMoveInTheirOwnLight) {
+    if (!listDevices()) GTEST_SKIP() << "no Vulkan device";
+    TestFolder folder("vcp_motion_bench_test");
+    std::ofstream(folder / "quad.json") << R"({"mesostructure": [{"asset": "blocks", "tiles": 2}],)"
+                                        << R"( "environment": {"source": "studio"}})";
+    const auto scene = openScene({folder / "quad.json"}, {}, {});
+    ASSERT_TRUE(scene) << scene.error().line();
+    MotionOptions options;
+    options.size = {64, 48};
+    options.seconds = 0.5;
+    options.viewer.renderer.budgetBytes = 16 << 20;
+    options.viewer.renderer.hostRays = true;
+    const auto report = measureMotion(*scene, options);
+    ASSERT_TRUE(report) << report.error().line();
+    EXPECT_GT(report->frameMs.size(), 0u);
+    EXPECT_TRUE(report->fullSizeAfterMs) << "full size never came back";
 }
 
 }  // namespace
