@@ -40,13 +40,14 @@ private:
 /// Appends pages in order, whatever the order they come in.
 class InOrder {
 public:
-    InOrder(PageSpool& pages, PageSpool* surfaces) : pages_(pages), surfaces_(surfaces) {}
+    explicit InOrder(const PageTasks& tasks)
+        : pages_(tasks.pages), surfaces_(tasks.surfaces), emptyToo_(tasks.emptyToo) {}
     Result<void> put(size_t number, BuiltPage page) {
         const std::scoped_lock lock(mutex_);
         ready_.emplace(number, std::move(page));
         for (auto at = ready_.begin(); at != ready_.end() && at->first == next_; at = ready_.erase(at), ++next_) {
             const BuiltPage& built = at->second;
-            if (built.entry.leaves > 0) VCP_TRY(pages_.append(built.entry, built.stored));
+            if (built.entry.leaves > 0 || emptyToo_) VCP_TRY(pages_.append(built.entry, built.stored));
             if (surfaces_ != nullptr && !built.surface.geometry.empty())
                 VCP_TRY(surfaces_->append({.morton = built.entry.morton}, built.surface));
         }
@@ -56,6 +57,7 @@ public:
 private:
     PageSpool& pages_;
     PageSpool* surfaces_;
+    bool emptyToo_;
     std::mutex mutex_;
     std::map<size_t, BuiltPage> ready_;
     size_t next_ = 0;
@@ -101,7 +103,7 @@ Result<void> forEachInOrder(size_t count, const std::function<Result<void>(size_
 
 Result<void> buildInOrder(const PageTasks& tasks) {
     const size_t count = tasks.work.size();
-    InOrder inOrder(tasks.pages, tasks.surfaces);
+    InOrder inOrder(tasks);
     std::vector<bool> isBuilt(count, false);
     VCP_TRY(buildLarge(tasks, inOrder, isBuilt));
     Admission admission(tasks.pageBytes);

@@ -29,6 +29,7 @@ struct PageTasks {
     std::function<Result<BuiltPage>(size_t)> build;  ///< called from any thread
     std::function<std::string(size_t)> description;  ///< what a page holds, for an error
     PageSpool& pages;                                ///< takes the pages that have leaves
+    bool emptyToo = false;                           ///< it takes the others, too
     PageSpool* surfaces;                             ///< takes the surfaces that are not empty; may be null
     const std::function<bool(double)>& progress;     ///< is given the part done; false stops
 };

@@ -63,6 +63,11 @@ Result<void> EntryCheck::check(uint64_t index, const PageEntry& e, uint32_t leve
         return fail(offsetof(PageEntry, parts), "kinds of parts out of range");
     if (e.parts == 0 && mostParts_ != 0 && e.leaves != 0)
         return fail(offsetof(PageEntry, parts), "kinds of parts are missing");
+    const bool isFinest = level + 1 == header_.levels;
+    if (header_.method == Method::Paper && e.leaves != 0 && level > 0 && !isFinest)
+        return fail(offsetof(PageEntry, leaves), "leaves between the two levels that have some");
+    if (header_.method == Method::Paper && e.childMask == 0 && !isFinest)
+        return fail(offsetof(PageEntry, childMask), "leads to no subvolume");
     if (level == 0 && e.morton != 0) return fail(offsetof(PageEntry, morton), "the root is not at the origin");
     return {};
 }

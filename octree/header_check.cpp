@@ -72,8 +72,7 @@ private:
                         fmt::format("it was built by method {}, which this program does not know: use a newer program",
                                     uint32_t(h_.method)),
                         ErrorCode::Unsupported);
-        if (isPaper_ && (h_.levels != 1 || h_.pages != 1 || h_.flags != 0))
-            return fail(128, "a file of this method has one page");
+        if (isPaper_ && h_.flags != 0) return fail(offsetof(FileHeader, flags), "a file of this method has no flags");
         const uint32_t unknown =
             h_.flags & ~(kFlagColour | (h_.version > 3 ? kFlagCovering : 0) | (h_.version > 5 ? kFlagParts : 0) |
                          (h_.version >= kMarkedFileVersion ? kFlagMarks : 0) |
@@ -113,6 +112,8 @@ private:
         if (h_.levels < 1 || h_.levels > kMaxLevels || h_.log2Cells < 1 ||
             h_.log2Cells > (isPaper_ ? kMaxPaperLog2Cells : 7))
             return fail(128, "levels or page size out of range");
+        if (isPaper_ && h_.log2Cells + h_.levels - 1 > kMaxPaperLog2Cells)
+            return fail(128, "more levels than a file of this method may have");
         if (h_.pages < 1 || h_.pages > kMaxPages || h_.pages > h_.fileBytes / sizeof(PageEntry))
             return fail(24, "page count out of range");
         return {};

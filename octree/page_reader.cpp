@@ -1,5 +1,6 @@
 #include "octree/page_reader.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -52,6 +53,11 @@ Result<void> checkAgainstEntry(const ByteReader& reader, const Dataset& dataset,
     return {};
 }
 
+bool fillsSubvolume(const PaperPageHeader& page, uint32_t log2Cells) {
+    return page.cellShift == 0 && page.rootLevel == log2Cells &&
+           std::ranges::all_of(page.roots, [](uint32_t roots) { return roots == 1; });
+}
+
 }  // namespace
 
 Result<PageBytes> readPage(const ByteReader& reader, const Dataset& dataset, uint64_t index, bool withColour) {
@@ -63,8 +69,10 @@ Result<PageBytes> readPage(const ByteReader& reader, const Dataset& dataset, uin
     if (!geometry) return brokenBytes(reader.name(), element, e.offset, geometry.error().message);
     page.geometry = *std::move(geometry);
     if (dataset.header.method == Method::Paper) {
-        const auto paper = parsePaperPage(page.geometryBytes(), dataset.header.log2Cells);
+        const auto paper = parsePaperPage(page.geometryBytes(), dataset.header.log2Cells + dataset.header.levels - 1);
         if (!paper) return brokenBytes(reader.name(), element, e.offset, paper.error().line());
+        if (e.level > 0 && !fillsSubvolume(paper->header, dataset.header.log2Cells))
+            return brokenBytes(reader.name(), element, e.offset, "its cells do not fill its subvolume");
         if (paper->header.leaves != e.leaves)
             return brokenBytes(
                 reader.name(), element, e.offset,

@@ -55,7 +55,7 @@ constexpr uint64_t blocksOf(uint64_t pages) { return (pages + kEntriesPerBlock -
 /// What the pages hold.
 enum class Method : uint32_t {
     Certified,  ///< octree/page/page.h
-    Paper,      ///< octree/page/paper_page.h: one level, one page, no certificate and no colour
+    Paper,      ///< octree/page/paper_page.h: no certificate and no colour; one page, or subvolumes
 };
 
 /// One level's row in the header.
@@ -78,10 +78,10 @@ struct FileHeader {
     double certifiedErrorMax = 0;  ///< largest certified error of the pages without children, world units
     double boundsMin[3] = {};      ///< lowest corner of the mesh's bounds, world units
     double boundsMax[3] = {};
-    uint32_t levels = 0;  ///< 1 to kMaxLevels
-    uint32_t log2Cells =
-        0;               ///< cells an edge of a page: 2^log2Cells; 1 to 7, of the method Paper to kMaxPaperLog2Cells
-    uint32_t flags = 0;  ///< kFlagColour, kFlagCovering, kFlagParts and the others below
+    uint32_t levels = 0;     ///< 1 to kMaxLevels
+    uint32_t log2Cells = 0;  ///< cells an edge of a page: 2^log2Cells; 1 to 7, of the method Paper to
+                             ///< kMaxPaperLog2Cells
+    uint32_t flags = 0;      ///< kFlagColour, kFlagCovering, kFlagParts and the others below
     Method method = Method::Certified;
     uint64_t triangles = 0, degenerateTriangles = 0, vertices = 0;
     uint64_t leaves = 0;      ///< soft, slab and hard leaves of the pages without children

@@ -128,8 +128,8 @@ struct DatasetLook {
 };
 
 /// All that a picture depends on, beside the pages. Datasets of the method `paper` (octree/page/paper_page.h) are drawn
-/// by their own march, from their one page. They have no beam pass, no shadows, no ambient occlusion and no caps: where
-/// a request asks for these, they are left out.
+/// by their own march, from their own pages. They have no beam pass, no shadows, no ambient occlusion and no caps:
+/// where a request asks for these, they are left out.
 struct FrameRequest {
     Camera camera;                        ///< camera of the whole picture, where this one is a tile
     uint32_t width = 1280, height = 720;  ///< 1 to 16384 each

@@ -301,6 +301,7 @@ SelectionView selectionView(const FrameRequest& request) {
     view.pixelsPerUnit = whole.fullHeight / (2 * basis.halfHeight);
     view.errorPixels = request.errorPixels;
     view.colourError = request.colourError;
+    view.paperReach = double(request.march.reach);
     view.pixels = double(request.width) * request.height;
     view.rays = numberOfRays(request);
     // The picture's edges are tangents, or world units where the projection is orthographic.

@@ -72,10 +72,30 @@ double shown(double length, double cell, const WorldCube& cube, const SelectionV
     return view.orthographic ? wide : std::min(wide, length * view.pixelsPerUnit / cell);
 }
 
+// Where a view allows no error, errors are compared as multiples of this.
+constexpr double kLeastErrorPixels = 1e-9;
+
+/// Returns the error of what stands for a cube of the method Paper: too much where the cube is near.
+double nearness(const Dataset& dataset, const WorldCube& cube, const SelectionView& view) {
+    const FileHeader& h = dataset.header;
+    const glm::dvec3 low(h.boundsMin[0], h.boundsMin[1], h.boundsMin[2]),
+        high(h.boundsMax[0], h.boundsMax[1], h.boundsMax[2]);
+    const double reach = view.paperReach * glm::length(high - low);
+    const double distance = glm::length(glm::clamp(view.eye, cube.low, cube.low + cube.edge) - view.eye);
+    if (distance >= reach) return 0;
+    return distance > 0 ? std::max(view.errorPixels, kLeastErrorPixels) * (reach / distance) : kInfinity;
+}
+
+/// Returns the error of a page, in pixels, where it is shown in a cube.
+double errorIn(const Dataset& dataset, const PageEntry& page, const WorldCube& cube, const SelectionView& view) {
+    if (dataset.header.method == Method::Paper) return nearness(dataset, cube, view);
+    return projected(refinedError(dataset, page, view), cube, view);
+}
+
 }  // namespace
 
 double projectedError(const Dataset& dataset, const PageEntry& page, const SelectionView& view) {
-    return projected(refinedError(dataset, page, view), cubeOf(dataset, page), view);
+    return errorIn(dataset, page, cubeOf(dataset, page), view);
 }
 
 double shownError(const Dataset& dataset, const PageEntry& page, const SelectionView& view) {
@@ -99,13 +119,12 @@ bool inFrustum(glm::dvec3 low, glm::dvec3 high, const SelectionView& view) {
 
 namespace {
 
-// Where a view allows no error, errors are compared as multiples of this.
-constexpr double kLeastErrorPixels = 1e-9;
-
 bool isTooCoarse(double error, const SelectionView& view) { return error > view.errorPixels; }
 
 /// Whether single children may replace a page in their octants: it has to have nodes that lie in one octant each.
-bool canBePartial(const Dataset& dataset, const PageEntry& page) { return dataset.isCovering() && page.leaves > 1; }
+bool canBePartial(const Dataset& dataset, const PageEntry& page) {
+    return dataset.header.method == Method::Paper || (dataset.isCovering() && page.leaves > 1);
+}
 
 /// A page as a view sees it: its error octant by octant where single children may replace it.
 struct PageInView {
@@ -119,11 +138,10 @@ struct PageInView {
           isInView(inFrustum(cube.low, cube.low + cube.edge, view)),
           isPartial(canBePartial(dataset, page)) {
         if (page.childMask == 0 || !isInView) return;
-        const double length = refinedError(dataset, page, view);
-        if (!isPartial) error.fill(projected(length, cube, view));
+        if (!isPartial) error.fill(errorIn(dataset, page, cube, view));
         for (uint32_t o = 0; o < 8; ++o) {
             if ((page.childMask >> o & 1) == 0) continue;
-            if (isPartial) error[o] = projected(length, cube.octant(o), view);
+            if (isPartial) error[o] = errorIn(dataset, page, cube.octant(o), view);
             if (isTooCoarse(error[o], view)) coarse = uint8_t(coarse | 1u << o);
         }
     }

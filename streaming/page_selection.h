@@ -17,6 +17,9 @@
 // but what comes into view is nearly fine enough. What is drawn is as fine as what is there allows. Elsewhere a page is
 // replaced by all its children or none.
 //
+// Nothing is certified of files of the method Paper. There a page is refined, octant by octant, where that is nearer
+// than a part of the dataset's diagonal (PaperMarch::reach), the nearest first, whatever rays hit.
+//
 // Several views, and several datasets of one scene, share one choice and one budget: a page is refined where any of
 // them needs it, the largest error as a multiple of what its view allows first. Each view draws the choice only as fine
 // as it needs, so where the budget suffices it draws what it would draw alone, and where it does not, all are relaxed
@@ -52,6 +55,7 @@ struct SelectionView {
     double errorPixels = 0.5;
     double colourError = std::numeric_limits<double>::infinity();  ///< ΔE, as colourErrorOf() has it
     double pixels = 0;                                             ///< of the picture
+    double paperReach = 0.25;                                      ///< PaperMarch::reach
     uint64_t rays = 0;  ///< any number that differs where other rays are cast from the same place
 
     bool operator==(const SelectionView&) const = default;

@@ -27,6 +27,7 @@ struct BuildNode {
     uint32_t first = 0;  ///< first of the eight children, one level below; of inner nodes
     uint32_t word = 0;   ///< where its word goes
     Kind kind = Kind::Empty;
+    bool isAround = false;  ///< it lies around the region, and has points only
 };
 
 glm::ivec3 octantOffset(int octant) { return {octant & 1, octant >> 1 & 1, octant >> 2 & 1}; }
@@ -40,9 +41,12 @@ public:
     Result<CornerOctree> build() {
         const auto limit = [](const char* what) { return Error{.code = ErrorCode::Limit, .message = what}; };
         const glm::dvec3 extent = (mesh_.high() - mesh_.low()) / options_.cell;
-        if (!(std::max({extent.x, extent.y, extent.z}) < RootGrid::kMaxCells / 2))
+        if (!options_.region && !(std::max({extent.x, extent.y, extent.z}) < RootGrid::kMaxCells / 2))
             return limit("the cells are too small for this mesh: more than 2^19 would lie across it");
-        tree_.frame = RootGrid::around(mesh_.low(), mesh_.high(), options_.cell, 4);
+        tree_.frame =
+            options_.region ? options_.region->grid : RootGrid::around(mesh_.low(), mesh_.high(), options_.cell, 4);
+        firstRoot_ = options_.region ? options_.region->firstRoot : glm::ivec3(0);
+        roots_ = options_.region ? options_.region->roots : tree_.frame.roots;
         levels_.resize(size_t(tree_.frame.rootLevel) + 1);
         makeRoots();
         for (int level = tree_.frame.rootLevel; level > kBlockLevel; --level) {
@@ -57,6 +61,8 @@ public:
         number();
         storeEmpty();
         storeLeaves();
+        tree_.frame.low = tree_.frame.worldFromGrid(glm::dvec3(firstRoot_ * (1 << tree_.frame.rootLevel)));
+        tree_.frame.roots = roots_;
         return std::move(tree_);
     }
 
@@ -90,11 +96,27 @@ private:
     }
 
     void makeRoots() {
-        const RootGrid& frame = tree_.frame;
-        auto& roots = levels_[frame.rootLevel];
-        for (int z = 0; z < frame.roots.z; ++z)
-            for (int y = 0; y < frame.roots.y; ++y)
-                for (int x = 0; x < frame.roots.x; ++x) roots.push_back({glm::ivec3(x, y, z) * (1 << frame.rootLevel)});
+        const int level = tree_.frame.rootLevel;
+        auto& roots = levels_[level];
+        for (int z = 0; z < roots_.z; ++z)
+            for (int y = 0; y < roots_.y; ++y)
+                for (int x = 0; x < roots_.x; ++x) roots.push_back({(firstRoot_ + glm::ivec3(x, y, z)) * (1 << level)});
+        if (options_.region && options_.growRounds > 0) addNodesAround();
+    }
+    /// Points of the region take over what points around it have, as far away as there are rounds.
+    void addNodesAround() {
+        constexpr int kLevel = 3, kEdge = 1 << kLevel;
+        static_assert(kLevel < CornerRegion::kLeastRootLevel);
+        const int edge = 1 << tree_.frame.rootLevel, width = (options_.growRounds / kEdge + 1) * kEdge;
+        const glm::ivec3 low = firstRoot_ * edge, high = low + roots_ * edge;
+        const glm::ivec3 from = glm::max(low - width, 0), to = glm::min(high + width, tree_.frame.cells());
+        for (int z = from.z; z < to.z; z += kEdge)
+            for (int y = from.y; y < to.y; y += kEdge)
+                for (int x = from.x; x < to.x; x += kEdge) {
+                    const glm::ivec3 p(x, y, z);
+                    if (p == glm::clamp(p, low, high - 1)) continue;
+                    levels_[kLevel].push_back({.low = p, .isAround = true});
+                }
     }
 
     /// Makes nodes without a point within `band` of the surface empty, the others inner.
@@ -108,13 +130,22 @@ private:
         });
     }
 
+    /// Whether points of the region may come to have what a point around it has.
+    [[nodiscard]] bool isReached(glm::ivec3 point) const {
+        const int edge = 1 << tree_.frame.rootLevel;
+        const glm::ivec3 low = firstRoot_ * edge, high = low + roots_ * edge;
+        const glm::ivec3 away = glm::abs(point - glm::clamp(point, low, high));
+        return std::max({away.x, away.y, away.z}) <= options_.growRounds;
+    }
+
     bool split(int level) {
         auto& children = levels_[level - 1];
         const int size = 1 << (level - 1);
         for (BuildNode& node : levels_[level]) {
             if (node.kind != Kind::Inner) continue;
             node.first = uint32_t(children.size());
-            for (int k = 0; k < 8; ++k) children.push_back({node.low + size * octantOffset(k)});
+            for (int k = 0; k < 8; ++k)
+                children.push_back({.low = node.low + size * octantOffset(k), .isAround = node.isAround});
             if (children.size() > CornerOctree::kEmpty / 2) return false;
         }
         return true;
@@ -129,12 +160,16 @@ private:
                     for (int x = 0; x <= 2; ++x) visit(block.low + glm::ivec3(x, y, z));
         };
         for (const BuildNode& block : blocks)
-            if (block.kind == Kind::Inner) forPoints(block, [&](glm::ivec3 point) { points_.add(point); });
+            if (block.kind == Kind::Inner)
+                forPoints(block, [&](glm::ivec3 point) {
+                    if (!block.isAround || isReached(point)) points_.add(point);
+                });
         if (options_.growRounds >= 0)
             growClosestPoints(mesh_.mesh(), tree_.frame, options_.growRounds, options_.threads, points_);
         else
             points_.fill(options_.threads, [&](glm::ivec3 point) { return sampleAt(point); });
         forEachIndex(blocks.size(), options_.threads, [&](size_t i) {
+            if (blocks[i].isAround) blocks[i].kind = Kind::Empty;
             if (blocks[i].kind != Kind::Inner) return;
             float least = std::numeric_limits<float>::infinity(), most = 0;
             forPoints(blocks[i], [&](glm::ivec3 point) {
@@ -175,6 +210,11 @@ private:
     [[nodiscard]] bool mergedIsGood(int level, const BuildNode& node) const {
         const int size = 1 << level, half = size / 2;
         const CornerSamples corners = cornersOf(node.low, size);
+        // A longer vector may be of a triangle that the region does not have.
+        if (options_.region && std::ranges::any_of(corners, [&](const CornerSample& corner) {
+                return std::abs(corner.distance) > options_.region->halo;
+            }))
+            return false;
         for (int point = 0; point < 27; ++point) {
             const glm::ivec3 at(point % 3, point / 3 % 3, point / 9);
             bool ofLeaf = false;
@@ -227,6 +267,7 @@ private:
             const BuildNode& node = at(empties_[i]);
             // A cell beside a leaf has no distance that is worth a step.
             float least = empties_[i].level == 0 ? 0 : leastOnBoundary(node.low, 1 << empties_[i].level);
+            if (options_.region) least = std::min(least, options_.region->halo);
             if (options_.safeEmpty) least = std::max(least - kPointToBoundary, 0.0f);
             const double scaled = std::min(double(least) / tree_.cutoff, 1.0) * (CornerOctree::kEmpty - 1);
             const double code = (options_.safeEmpty ? std::floor(scaled) : std::ceil(scaled)) + CornerOctree::kEmpty;
@@ -290,13 +331,19 @@ private:
             tree_.nodes[at(leaves_[i]).word] = -int32_t(slice[i]) - 1;
         }
         tree_.largest = largestDistance();
-        tree_.slices.resize(slices);
+        if (options_.region)
+            tree_.vectors.resize(slices);
+        else
+            tree_.slices.resize(slices);
         forEachIndex(leaves_.size(), options_.threads, [&](size_t i) {
             const CornerSamples corners = cornersOf(at(leaves_[i]).low, 1 << leaves_[i].level);
             // A shared slice is written once, by the leaf before it.
             for (uint32_t x = adjoins[i] ? 1 : 0; x < 2; ++x)
                 for (uint32_t k = 0; k < 4; ++k)
-                    tree_.slices[slice[i] + x][k] = field_.pack(corners[x + 2 * k], tree_.largest);
+                    if (options_.region)
+                        tree_.vectors[slice[i] + x][k] = corners[x + 2 * k].toSurface;
+                    else
+                        tree_.slices[slice[i] + x][k] = field_.pack(corners[x + 2 * k], tree_.largest);
         });
     }
     [[nodiscard]] float largestDistance() const {
@@ -312,13 +359,21 @@ private:
     const MeshSides* sides_;
     const CornerField& field_;
     const CornerOctreeOptions& options_;
-    CornerOctree tree_;
+    CornerOctree tree_;                   // its frame is that of the whole grid until the end
+    glm::ivec3 firstRoot_{0}, roots_{1};  // of the grid
     std::vector<std::vector<BuildNode>> levels_;
     GridPoints<CornerSample> points_;
     std::vector<NodeRef> empties_, leaves_;
 };
 
 }  // namespace
+
+float haloOf(const CornerField& field, int growRounds) {
+    // The farthest block with a point that counts reaches two cells beyond it, and is kept where the surface is within
+    // the band and half its diagonal.
+    constexpr float kBlock = 4, kUsual = 16;
+    return std::max(kUsual, std::ceil(field.band()) + float(std::max(growRounds, 0)) + kBlock);
+}
 
 Result<CornerOctree> buildCornerOctree(const MeshBvh& mesh, const MeshSides* sides, const CornerField& field,
                                        const CornerOctreeOptions& options) {

@@ -16,6 +16,7 @@
 #include <array>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <vector>
 
 #include "builder/measure/mesh_bvh.h"
@@ -60,6 +61,8 @@ public:
     RootGrid frame;
     std::vector<int32_t> nodes;  ///< the roots first, x lowest
     std::vector<std::array<uint32_t, 4>> slices;
+    /// In place of `slices`, of a region: the vectors, which are packed once the longest of all regions is known.
+    std::vector<std::array<glm::vec3, 4>> vectors;
     float cutoff = 1;   ///< D, cells
     float largest = 0;  ///< largest distance stored in a leaf, cells
     uint64_t leaves = 0, emptyNodes = 0;
@@ -79,6 +82,18 @@ public:
     [[nodiscard]] uint64_t bytes() const { return nodes.size() * 4 + slices.size() * 16; }
 };
 
+/// Roots of a larger grid that get an octree of their own. Its vectors are those that the octree of the whole grid has
+/// there: points take over what points around the region have, which are sampled for that. Where the whole one has a
+/// leaf with a vector longer than `halo`, the region has smaller ones; its empty nodes are at most `halo` away.
+struct CornerRegion {
+    RootGrid grid;
+    glm::ivec3 firstRoot{0}, roots{1};
+    /// The mesh has all triangles that are within so many cells of the region; at least haloOf().
+    float halo = 0;
+
+    static constexpr int kLeastRootLevel = 4;
+};
+
 struct CornerOctreeOptions {
     double cell = 1;  ///< world units
     /// What an empty node stores is lowered by sqrt(1/2) cell, the farthest that a point of the boundary lies from
@@ -88,9 +103,14 @@ struct CornerOctreeOptions {
     /// are empty. kExactPoints: closest points of the whole mesh.
     int growRounds = kExactPoints;
     unsigned threads = 0;
+    /// A part of a grid, in place of a grid around the whole mesh. `cell` is the grid's; of fields without signs.
+    std::optional<CornerRegion> region = {};
 
     static constexpr int kExactPoints = -1;
 };
+
+/// Returns the least halo of regions.
+float haloOf(const CornerField& field, int growRounds);
 
 /// Builds the octree. `sides` is needed by signed fields. Errors: Limit where a grid of more than RootGrid::kMaxCells /
 /// 2 cells an edge or 2^30 nodes would be needed.

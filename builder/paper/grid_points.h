@@ -1,6 +1,7 @@
 // Values at grid points of a sparse grid: collected, then computed at once, then looked up.
 #pragma once
 
+#include <bit>
 #include <cstdint>
 #include <optional>
 #include <vector>
@@ -61,7 +62,8 @@ private:
     }
     [[nodiscard]] size_t slotOf(uint64_t key) const {
         const size_t mask = slots_.size() - 1;
-        size_t slot = (key * 0x9E3779B97F4A7C15u >> 20) & mask;
+        // The product's highest bits depend on all of the key's.
+        size_t slot = size_t(key * 0x9E3779B97F4A7C15u >> (64 - std::bit_width(mask)));
         while (slots_[slot] != kFree && slots_[slot] != key) slot = (slot + 1) & mask;
         return slot;
     }

@@ -5,13 +5,13 @@
 #include <cstring>
 #include <limits>
 
-#include <sys/resource.h>
-
 #include <fmt/format.h>
 #include <glm/geometric.hpp>
 
+#include "builder/bin_passes.h"
 #include "builder/ingest.h"
 #include "builder/mesh/open_mesh.h"
+#include "builder/paper/paper_subvolumes.h"
 #include "octree/io/output_claim.h"
 #include "octree/io/output_file.h"
 #include "octree/vcp_writer.h"
@@ -21,45 +21,6 @@ namespace vcp {
 namespace {
 
 constexpr uint64_t kMostPageBytes = uint64_t{1} << 28;
-
-Result<PageBytes> pageOf(const PaperCaster& octree) {
-    const CornerOctree& tree = octree.tree();
-    PaperPageHeader header;
-    header.rootLevel = uint32_t(tree.frame.rootLevel);
-    header.packing = uint32_t(octree.options().packing);
-    header.nodes = uint32_t(tree.nodes.size());
-    for (int axis = 0; axis < 3; ++axis) header.roots[axis] = uint32_t(tree.frame.roots[axis]);
-    header.slices = uint32_t(tree.slices.size());
-    header.cutoff = tree.cutoff;
-    header.longest = tree.largest;
-    header.leaves = uint32_t(tree.leaves);
-    header.emptyNodes = uint32_t(tree.emptyNodes);
-    const PaperSections sections = paperSections(header);
-    if (sections.end > kMostPageBytes)
-        return Error{
-            .code = ErrorCode::Limit,
-            .message = fmt::format(
-                "the octree takes {} bytes, and of this method a file holds {} at most; use a larger cell edge",
-                sections.end, kMostPageBytes)};
-    PageBytes page;
-    page.geometry.resize(sections.end / 16);
-    auto* out = reinterpret_cast<std::byte*>(page.geometry.data());
-    std::memcpy(out, &header, sizeof header);
-    std::memcpy(out + sizeof header, tree.nodes.data(), tree.nodes.size() * 4);
-    std::memcpy(out + sections.slices, tree.slices.data(), tree.slices.size() * 16);
-    return page;
-}
-
-PaperParameters parametersOf(const PaperOptions& options) {
-    PaperParameters parameters;
-    parameters.band = options.band;
-    parameters.mergeThreshold = options.mergeThreshold;
-    parameters.growRounds = options.growRounds;
-    parameters.packing = uint32_t(options.packing);
-    parameters.mergeScheme = uint32_t(options.mergeScheme);
-    parameters.safeEmpty = options.safeEmpty ? 1 : 0;
-    return parameters;
-}
 
 SoupMeasures measuresOf(const IndexedMesh& mesh) {
     SoupMeasures m;
@@ -127,16 +88,50 @@ Result<uint64_t> write(const BuildOptions& options, const PaperFile& file) {
     return writer->commit(file.header);
 }
 
-uint64_t peakRssBytes() {
-    rusage usage{};
-    ::getrusage(RUSAGE_SELF, &usage);
-    return uint64_t(usage.ru_maxrss) * 1024;
-}
-
 }  // namespace
 
+Result<PageBytes> paperPage(const CornerOctree& tree, PaperPacking packing, uint32_t cellShift) {
+    PaperPageHeader header;
+    header.rootLevel = uint32_t(tree.frame.rootLevel);
+    header.packing = uint32_t(packing);
+    header.nodes = uint32_t(tree.nodes.size());
+    for (int axis = 0; axis < 3; ++axis) header.roots[axis] = uint32_t(tree.frame.roots[axis]);
+    header.slices = uint32_t(tree.slices.size());
+    header.cutoff = tree.cutoff;
+    header.longest = tree.largest;
+    header.leaves = uint32_t(tree.leaves);
+    header.emptyNodes = uint32_t(tree.emptyNodes);
+    header.cellShift = cellShift;
+    const PaperSections sections = paperSections(header);
+    if (sections.end > kMostPageBytes)
+        return Error{
+            .code = ErrorCode::Limit,
+            .message = fmt::format(
+                "the octree takes {} bytes, and of this method a page holds {} at most; use a larger cell edge, or cut "
+                "it into subvolumes",
+                sections.end, kMostPageBytes)};
+    PageBytes page;
+    page.geometry.resize(sections.end / 16);
+    auto* out = reinterpret_cast<std::byte*>(page.geometry.data());
+    std::memcpy(out, &header, sizeof header);
+    std::memcpy(out + sizeof header, tree.nodes.data(), tree.nodes.size() * 4);
+    if (!tree.slices.empty()) std::memcpy(out + sections.slices, tree.slices.data(), tree.slices.size() * 16);
+    return page;
+}
+
+PaperParameters parametersOf(const PaperOptions& options) {
+    PaperParameters parameters;
+    parameters.band = options.band;
+    parameters.mergeThreshold = options.mergeThreshold;
+    parameters.growRounds = options.growRounds;
+    parameters.packing = uint32_t(options.packing);
+    parameters.mergeScheme = uint32_t(options.mergeScheme);
+    parameters.safeEmpty = options.safeEmpty ? 1 : 0;
+    return parameters;
+}
+
 Result<PaperFile> paperFile(const PaperCaster& octree, const IndexedMesh& mesh) {
-    VCP_TRY_ASSIGN(auto page, pageOf(octree));
+    VCP_TRY_ASSIGN(auto page, paperPage(octree.tree(), octree.options().packing));
     PageEntry entry;
     entry.pageBytes = uint32_t(page.geometryBytes().size());
     entry.leaves = uint32_t(octree.tree().leaves);
@@ -144,6 +139,7 @@ Result<PaperFile> paperFile(const PaperCaster& octree, const IndexedMesh& mesh) 
 }
 
 Result<BuildReport> buildPaperFile(const BuildOptions& options, const PaperOptions& paper) {
+    if (paper.subvolumeCells > 0) return buildPaperSubvolumes(options, paper);
     VCP_TRY_ASSIGN(const auto claim, OutputClaim::take(options.output));
     VCP_TRY(checkOutput(options.output, OutputKind::Dataset, rulesOf(options)));
     const auto began = std::chrono::steady_clock::now();

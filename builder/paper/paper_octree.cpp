@@ -91,22 +91,28 @@ glm::vec3 PaperDecoder::spherical(uint32_t code) {
     return {c * kAngles.cosPhi[phi], c * kAngles.sinPhi[phi], kAngles.sinTheta[theta]};
 }
 
-LeafVectors PaperCaster::vectorsOf(int32_t leaf) const {
-    const uint32_t* codes = tree_->leafCodes(leaf);
+LeafVectors PaperDecoder::leaf(const uint32_t* codes) const {
     LeafVectors vectors;
     for (int k = 0; k < 8; ++k) {
-        const glm::vec3 v = decode_(codes[k]);
+        const glm::vec3 v = (*this)(codes[k]);
         vectors.x[k] = v.x, vectors.y[k] = v.y, vectors.z[k] = v.z;
     }
     return vectors;
 }
 
-Result<PaperCaster> PaperCaster::create(const MeshBvh& mesh, const PaperOptions& options,
-                                        const CornerOctreeOptions& build) {
+float vectorHalo(const PaperOptions& options) { return haloOf(VectorField(options), options.growRounds); }
+
+Result<CornerOctree> buildVectorOctree(const MeshBvh& mesh, const PaperOptions& options,
+                                       const CornerOctreeOptions& build) {
     CornerOctreeOptions structure = build;
     structure.growRounds = options.growRounds;
     structure.safeEmpty = options.safeEmpty;
-    VCP_TRY_ASSIGN(auto tree, buildCornerOctree(mesh, nullptr, VectorField(options), structure));
+    return buildCornerOctree(mesh, nullptr, VectorField(options), structure);
+}
+
+Result<PaperCaster> PaperCaster::create(const MeshBvh& mesh, const PaperOptions& options,
+                                        const CornerOctreeOptions& build) {
+    VCP_TRY_ASSIGN(auto tree, buildVectorOctree(mesh, options, build));
     return PaperCaster(std::move(tree), options);
 }
 

@@ -36,6 +36,7 @@ struct PaperOptions {
     /// k: rounds of region growing, or CornerOctreeOptions::kExactPoints. 5 reach every point of the default band.
     int growRounds = 5;
     bool safeEmpty = false;  ///< CornerOctreeOptions::safeEmpty
+    int subvolumeCells = 0;  ///< edge of the file's subvolumes (paper_subvolumes.h); 0: a file has one page
 
     bool operator==(const PaperOptions&) const = default;
 };
@@ -55,6 +56,8 @@ public:
         const float root = float(code & 8191u) * perStep_;
         return root * root * (packing_ == PaperPacking::Spherical ? spherical(code) : paper::octahedralDirection(code));
     }
+    /// Decodes the vectors of a leaf's corners.
+    [[nodiscard]] LeafVectors leaf(const uint32_t* codes) const;
 
 private:
     [[nodiscard]] static glm::vec3 spherical(uint32_t code);
@@ -63,9 +66,15 @@ private:
     float perStep_;
 };
 
+/// Returns the least halo of regions of such an octree.
+float vectorHalo(const PaperOptions& options);
+/// Builds the octree. `build`: its growRounds and safeEmpty are those of `options`.
+Result<CornerOctree> buildVectorOctree(const MeshBvh& mesh, const PaperOptions& options,
+                                       const CornerOctreeOptions& build);
+
 class PaperCaster {
 public:
-    /// Builds the octree. `build`: its growRounds and safeEmpty are those of `options`.
+    /// Builds the octree, as buildVectorOctree does.
     static Result<PaperCaster> create(const MeshBvh& mesh, const PaperOptions& options,
                                       const CornerOctreeOptions& build);
 
@@ -84,12 +93,41 @@ private:
         : tree_(std::make_shared<const CornerOctree>(std::move(tree))),
           options_(options),
           decode_(tree_->largest, options.packing) {}
-    [[nodiscard]] LeafVectors vectorsOf(int32_t leaf) const;
 
     std::shared_ptr<const CornerOctree> tree_;  // shared by copies with other rules of the march
     PaperOptions options_;
     PaperDecoder decode_;
 };
+
+/// What a step of the march finds, in cells. `epsilon`: a ray hits where the distance is below this.
+struct PaperSample {
+    float distance, epsilon;
+    bool isLeaf;
+    glm::vec3 vector;  ///< of a leaf
+};
+
+/// Marches along a ray. `sampleAt(t)` returns the PaperSample there.
+template <class SampleAt>
+GridHit marchPaper(const PaperMarch& rules, const GridRay& ray, const SampleAt& sampleAt) {
+    float t = 0, lastT = 0, lastDistance = 0;
+    for (uint32_t step = 0; step < paper::kPaperMostSteps && t <= ray.tMax; ++step) {
+        const PaperSample at = sampleAt(t);
+        if (at.isLeaf && at.distance < at.epsilon) {
+            if (!rules.back) return {t, at.vector};
+            const float hit = lastT + paper::marchBack(lastDistance, at.distance, at.epsilon) * (t - lastT);
+            // The normal is that of the point moved back to: here the vector may be too short to point anywhere.
+            const PaperSample back = sampleAt(hit);
+            return {hit, back.isLeaf && back.distance > 0 ? back.vector : at.vector};
+        }
+        lastT = t;
+        lastDistance = at.distance;
+        t += at.isLeaf
+                 ? paper::marchStep(at.distance, glm::dot(at.vector, ray.direction), at.epsilon, uint32_t(rules.step))
+                 : std::max(at.distance, at.epsilon);
+    }
+    if (t <= ray.tMax) return {std::numeric_limits<float>::quiet_NaN(), {}};
+    return {};
+}
 
 template <class Work>
 GridHit PaperCaster::cast(const GridRay& ray, Work& work) const {
@@ -98,12 +136,7 @@ GridHit PaperCaster::cast(const GridRay& ray, Work& work) const {
     LeafVectors corners;
     int32_t known = 0;
     const glm::ivec3 last = tree_->frame.cells() - 1;
-    struct Sample {
-        float distance;
-        bool isLeaf;
-        glm::vec3 vector;  // vector of a leaf
-    };
-    const auto sampleAt = [&](float t) -> Sample {
+    const auto sampleAt = [&](float t) -> PaperSample {
         work.step();
         const glm::vec3 p = ray.origin + t * ray.direction;
         if (!rules.cached) {
@@ -111,35 +144,18 @@ GridHit PaperCaster::cast(const GridRay& ray, Work& work) const {
             known = 0;
         }
         const int32_t word = finder.find(cellAt(p, last), work);
-        if (!CornerOctree::isLeaf(word)) return {tree_->emptyDistance(word), false, glm::vec3(0)};
+        if (!CornerOctree::isLeaf(word)) return {tree_->emptyDistance(word), rules.epsilon, false, glm::vec3(0)};
         if (word != known) {
-            corners = vectorsOf(word);
+            corners = decode_.leaf(tree_->leafCodes(word));
             known = word;
             work.cell();
             work.fetch(2);
         }
         const auto size = float(1 << finder.level());
         const glm::vec3 v = interpolateVectors(corners, size, (p - glm::vec3(finder.low())) / size, rules.scheme);
-        return {glm::length(v), true, v};
+        return {glm::length(v), rules.epsilon, true, v};
     };
-    float t = 0, lastT = 0, lastDistance = 0;
-    for (uint32_t step = 0; step < paper::kPaperMostSteps && t <= ray.tMax; ++step) {
-        const Sample at = sampleAt(t);
-        if (at.isLeaf && at.distance < rules.epsilon) {
-            if (!rules.back) return {t, at.vector};
-            const float hit = lastT + paper::marchBack(lastDistance, at.distance, rules.epsilon) * (t - lastT);
-            // The normal is that of the point moved back to: here the vector may be too short to point anywhere.
-            const Sample back = sampleAt(hit);
-            return {hit, back.isLeaf && back.distance > 0 ? back.vector : at.vector};
-        }
-        lastT = t;
-        lastDistance = at.distance;
-        t += at.isLeaf ? paper::marchStep(at.distance, glm::dot(at.vector, ray.direction), rules.epsilon,
-                                          uint32_t(rules.step))
-                       : std::max(at.distance, rules.epsilon);
-    }
-    if (t <= ray.tMax) return {std::numeric_limits<float>::quiet_NaN(), {}};
-    return {};
+    return marchPaper(rules, ray, sampleAt);
 }
 
 }  // namespace vcp

@@ -32,11 +32,16 @@ struct RootGrid {
     /// Makes a grid about the middle of a box, with at least `margin` cells around it. Precondition: the box is at most
     /// kMaxCells / 2 cells across.
     static RootGrid around(glm::dvec3 boxLow, glm::dvec3 boxHigh, double cell, int margin) {
-        RootGrid frame;
-        frame.cell = cell;
         const glm::dvec3 wanted = (boxHigh - boxLow) / cell + 2.0 * margin;
         const double longest = std::max({wanted.x, wanted.y, wanted.z, 1.0});
-        frame.rootLevel = std::max(2, int(std::ceil(std::log2(longest / kRootsAcross))));
+        return around(boxLow, boxHigh, cell, margin, std::max(2, int(std::ceil(std::log2(longest / kRootsAcross)))));
+    }
+    /// Does so with roots of a given size.
+    static RootGrid around(glm::dvec3 boxLow, glm::dvec3 boxHigh, double cell, int margin, int rootLevel) {
+        RootGrid frame;
+        frame.cell = cell;
+        frame.rootLevel = rootLevel;
+        const glm::dvec3 wanted = (boxHigh - boxLow) / cell + 2.0 * margin;
         frame.roots = glm::max(glm::ivec3(glm::ceil(wanted / double(1 << frame.rootLevel))), glm::ivec3(1));
         frame.low = 0.5 * (boxLow + boxHigh) - 0.5 * cell * glm::dvec3(frame.cells());
         return frame;

@@ -17,11 +17,13 @@ constexpr uint32_t kMaxLevel = 20;
 
 Result<void> checkHeader(const PaperPageHeader& h, uint64_t bytes, uint32_t log2Cells) {
     if (h.magic != PaperPageHeader::kMagic) return brokenPage(0, "not a page of this method");
+    if (h.cellShift > log2Cells)
+        return brokenPage(offsetof(PaperPageHeader, cellShift), "size of the cells out of range");
     if (h.rootLevel < 1 || h.rootLevel > kMaxLevel || log2Cells > kMaxLevel)
         return brokenPage(4, "size of the roots out of range");
     uint64_t roots = 1;
     for (const uint32_t count : h.roots) {
-        if (count < 1 || count > kMaxRoots || uint64_t{count} << h.rootLevel > uint64_t{1} << log2Cells)
+        if (count < 1 || count > kMaxRoots || uint64_t{count} << h.rootLevel > uint64_t{1} << (log2Cells - h.cellShift))
             return brokenPage(16, "number of roots out of range");
         roots *= count;
     }

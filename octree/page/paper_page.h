@@ -1,4 +1,9 @@
-// A page of the method `paper`: the octree of Demir and Westermann 2015, sections 3 and 4, for the whole dataset.
+// A page of the method `paper`: the octree of Demir and Westermann 2015, sections 3 and 4.
+//
+// A file has one page for the whole dataset; or, as in their 4.3, one of large cells for the whole, which is the
+// root's, and one of the finest cells for each subvolume near the surface, which are those of the finest level. Pages
+// between the two only lead from one to the other. All are parts of one grid and have one longest vector, but for the
+// root.
 //
 //   offset   bytes            section
 //   0        64               PaperPageHeader
@@ -8,7 +13,8 @@
 //
 // Node word: inner [0, 2^30): number of its first child, greater than its own; empty [2^30, 2^31): 2^30 plus the
 // distance that the node is from the surface, 2^30 - 1 being `cutoff`; leaf -(i + 1): its corners are slices i and i
-// + 1. Lengths are in finest cells.
+// + 1. Lengths are in the page's
+// cells.
 #pragma once
 
 #include <cstddef>
@@ -49,6 +55,8 @@ struct PaperMarch {
     PaperStep step = PaperStep::Planar;
     bool back = true;    ///< a hit is moved back to where the distance is epsilon
     bool cached = true;  ///< a step reuses the node and the leaf of the step before
+    /// Subvolumes nearer than this part of the diagonal of the dataset's bounds are drawn of finest cells (4.3).
+    float reach = 0.25f;
 
     bool operator==(const PaperMarch&) const = default;
 };
@@ -72,12 +80,13 @@ struct PaperPageHeader {
     uint32_t slices = 0;
     float cutoff = 0, longest = 0;  ///< largest distance that an empty node states; length of the longest vector
     uint32_t leaves = 0, emptyNodes = 0;
-    uint32_t reserved[4] = {};
+    uint32_t cellShift = 0;  ///< its cells are 2^cellShift of the file's finest ones an edge; 0 but for the root's
+    uint32_t reserved[3] = {};
 
     static constexpr uint32_t kMagic = 0x50504356;  // "VCPP"
 };
 static_assert(sizeof(PaperPageHeader) == paper::kPaperHeaderBytes && offsetof(PaperPageHeader, roots) == 16 &&
-              offsetof(PaperPageHeader, cutoff) == 32);
+              offsetof(PaperPageHeader, cutoff) == 32 && offsetof(PaperPageHeader, cellShift) == 48);
 
 /// Byte offsets of the slices and of the page's end.
 struct PaperSections {
@@ -93,8 +102,8 @@ struct PaperPageView {
 };
 
 /// Checks every word, so that no march can leave the page or loop: counts against the size, the roots fit a cube of
-/// 2^log2Cells cells, inner nodes form a tree, leaves are in range. `bytes` must be 16-byte aligned; may be hostile.
-/// Errors: InvalidInput, with the byte within the page.
+/// 2^log2Cells finest cells, inner nodes form a tree, leaves are in range. `bytes` must be 16-byte aligned; may be
+/// hostile. Errors: InvalidInput, with the byte within the page.
 Result<PaperPageView> parsePaperPage(std::span<const std::byte> bytes, uint32_t log2Cells);
 
 }  // namespace vcp

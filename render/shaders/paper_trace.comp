@@ -20,12 +20,18 @@ layout(local_size_x = 8, local_size_y = 8) in;
 
 #include "render/shaders/paper_cast.glsl"
 
+// Returns the level of the leaf that was hit as a part of that of the roots, from the roots down.
+float levelShown(PaperHit hit, PaperPage root) {
+    int levels = root.rootLevel + root.shift;
+    return float(levels - hit.level) / float(levels);
+}
+
 // Returns what a false colour shows, 0 to 1 (ShadingMode). Nothing is certified; levels are those of the leaves.
 float falseColour(PaperHit hit, Work work, PaperPage page) {
     return frame.shadingMode == kShadeSteps     ? float(work.steps) / kMostShownSteps
            : frame.shadingMode == kShadeCells   ? float(work.cells) / kMostShownCells
            : frame.shadingMode == kShadeFetches ? float(work.fetches) / kMostShownFetches
-           : frame.shadingMode == kShadeLevel   ? float(page.rootLevel - hit.level) / float(page.rootLevel)
+           : frame.shadingMode == kShadeLevel   ? levelShown(hit, page)
                                                 : 0.0;
 }
 
@@ -35,7 +41,7 @@ void main() {
     if (!listedPixel(tile, pixel)) return;
 
     Ray ray = rayAt(vec2(pixel) + 0.5);
-    PaperPage page = fetchPaperPage();
+    PaperPage page = fetchRootPage();
     Work work = Work(0u, 0u, 0u);
     Interval kept = Interval(0.0, kNoHit, vec3(0.0));
     if (kSections != 0u) kept = keptInterval(ray);

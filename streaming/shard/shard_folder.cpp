@@ -310,7 +310,7 @@ Result<ShardReport> writeShards(const ByteReader& file, const ShardOptions& opti
     VCP_TRY_ASSIGN(const auto dataset, readDataset(file));
     if (dataset.header.method == Method::Paper)
         return Error{.code = ErrorCode::Usage,
-                     .message = "is of the method paper: it has one page, and is not cut into shards",
+                     .message = "is of the method paper, whose files are not cut into shards",
                      .file = file.name()};
     return FolderWriter(file, dataset, options, std::move(folder)).run();
 }

@@ -30,7 +30,8 @@ const std::vector<Room>& rooms() {
         {"builder/parts",
          {"octree/", "builder", "builder/stream", "builder/texture", "builder/mesh", "builder/spill", "builder/lattice",
           "builder/page", "builder/level"}},
-        {"builder/paper", {"octree/", "builder", "builder/mesh", "builder/measure"}},
+        {"builder/paper",
+         {"octree/", "builder", "builder/mesh", "builder/spill", "builder/lattice", "builder/measure"}},
 
         {"mesostructure/gdm", {"octree/"}},
         {"mesostructure", {"octree/", "mesostructure/gdm"}},

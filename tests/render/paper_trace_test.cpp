@@ -4,10 +4,15 @@
 
 #include <gtest/gtest.h>
 
+#include "builder/paper/paper_file.h"
+#include "streaming/page_source.h"
+#include "tests/support/mesh_files.h"
 #include "tests/support/renderer_fixture.h"
+#include "tests/support/test_folder.h"
 #include "tests/support/test_meshes.h"
 #include "viewer/bench/peers/grid_rays.h"
 #include "viewer/bench/peers/paper_dataset.h"
+#include "viewer/bench/peers/subvolume_caster.h"
 
 namespace vcp {
 namespace {
@@ -51,8 +56,9 @@ protected:
         ASSERT_TRUE(opened) << opened.error().line();
     }
     /// Hit or miss, more than a tenth of a cell apart, and unequal numbers of samples.
-    Comparison compare(const PaperScene& scene, FrameRequest request) {
-        PaperCaster caster = *scene.caster;
+    Comparison compare(const PaperScene& scene, const FrameRequest& request) { return compare(*scene.caster, request); }
+    template <class Caster>
+    Comparison compare(Caster caster, FrameRequest request) {
         caster.setMarch(request.march);
         request.shading.mode = ShadingMode::Steps;
         draw(request);
@@ -82,7 +88,8 @@ protected:
         c.depthMean /= double(std::max<uint64_t>(c.hits, 1));
         return c;
     }
-    void expectSame(const PaperScene& scene, const FrameRequest& request) {
+    template <class Scene>
+    void expectSame(const Scene& scene, const FrameRequest& request) {
         const Comparison c = compare(scene, request);
         EXPECT_GT(c.hits, 1000u);
         // Single precision decides otherwise at outlines, and where a distance is just epsilon.
@@ -140,6 +147,76 @@ TEST_F(PaperTrace, EveryRuleIsTheCpus) {
             expectSame(scene, request);
         }
     }
+}
+
+/// A file in subvolumes of 16 cells, and the same mesh as one octree.
+struct SubvolumeScene {
+    SubvolumeScene() : folder("vcp_paper_trace_test"), one(test::torusMesh({0.3, 0.2, 0.1}, 2, 0.8, 90, 40), kCell) {
+        const std::filesystem::path ply = folder / "mesh.ply", file = folder / "mesh.vcp";
+        test::writePly(one.mesh, ply);
+        BuildOptions build;
+        build.inputs = {ply};
+        build.output = file;
+        build.cell = kCell;
+        PaperOptions paper;
+        paper.subvolumeCells = 16;
+        EXPECT_TRUE(buildPaperFile(build, paper));
+        const std::shared_ptr<const ByteReader> reader = *openFile(file);
+        dataset = std::make_shared<const Dataset>(*readDataset(*reader));
+        source = std::make_shared<const FilePageSource>(reader, dataset);
+        caster.emplace(*SubvolumeCaster::open(file, {}));
+    }
+    static constexpr double kCell = 0.05;
+
+    TestFolder folder;
+    PaperScene one;
+    std::shared_ptr<const Dataset> dataset;
+    std::shared_ptr<const PageSource> source;
+    std::optional<SubvolumeCaster> caster;
+};
+
+TEST_F(PaperTrace, SubvolumesAreWhatTheCpuShows) {
+    start();
+    const SubvolumeScene scene;
+    ASSERT_TRUE(renderer_->open(scene.dataset, scene.source));
+    FrameRequest request = test::requestOf(scene.one.camera({-0.3, -0.5, -1}, 0.6), kWidth, kHeight);
+    uint64_t few = 0;
+    for (const float reach : {0.0f, 0.25f, 0.5f, 1e6f}) {
+        request.march.reach = reach;
+        expectSame(*scene.caster, request);
+        const uint64_t resident = renderer_->settle(request)->pagesInCut;
+        EXPECT_GE(resident, few) << "the farther, the more subvolumes are near";
+        few = resident;
+        EXPECT_TRUE(reach > 0 || resident == 1) << "that of the larger cells";
+    }
+    EXPECT_GT(few, 50u);
+    request.camera = scene.one.camera({1, 0.2, 0.4}, 0.25);
+    request.march = {};
+    expectSame(*scene.caster, request);
+}
+
+TEST_F(PaperTrace, NearSubvolumesShowWhatTheOnePageDoes) {
+    start();
+    const SubvolumeScene scene;
+    FrameRequest request = test::requestOf(scene.one.camera({-0.3, -0.5, -1}), kWidth, kHeight);
+    request.march.reach = 1e6f;
+    open(scene.one);
+    draw(request);
+    const auto whole = renderer_->readDepth();
+    ASSERT_TRUE(renderer_->open(scene.dataset, scene.source));
+    draw(request);
+    const auto cut = renderer_->readDepth();
+    ASSERT_TRUE(whole && cut);
+    uint64_t hits = 0, different = 0;
+    for (size_t i = 0; i < whole->size(); ++i) {
+        const bool both = std::isfinite((*whole)[i]) && std::isfinite((*cut)[i]);
+        hits += both ? 1 : 0;
+        const bool isSame = both ? std::abs((*whole)[i] - (*cut)[i]) < 0.2 * SubvolumeScene::kCell
+                                 : std::isinf((*whole)[i]) == std::isinf((*cut)[i]);
+        different += isSame ? 0 : 1;
+    }
+    EXPECT_GT(hits, 3000u);
+    EXPECT_LE(different, kWidth * kHeight / 200) << "outlines: the rays start elsewhere";
 }
 
 TEST_F(PaperTrace, OnlyItsOwnPassesAreMade) {

@@ -87,6 +87,60 @@ TEST(PageSelection, CoarseFromFarFineFromNear) {
         }
 }
 
+/// Of the method Paper, with subvolumes everywhere; nothing is certified.
+Dataset paperTree(uint32_t levels) {
+    Dataset dataset = fullTree(levels, 0);
+    dataset.header.method = Method::Paper;
+    for (double& high : dataset.header.boundsMax) high = 1;
+    return dataset;
+}
+
+TEST(PageSelection, PapersSubvolumesAreFineWhereTheyAreNear) {
+    const Input in(paperTree(4));
+    const auto distanceTo = [&](const PageEntry& page, glm::dvec3 eye) {
+        const glm::dvec3 low = in.dataset.originOf(page);
+        return glm::length(glm::clamp(eye, low, low + in.dataset.edgeOf(page)) - eye);
+    };
+    for (const double errorPixels : {0.0, 0.5, 4.0})
+        for (const double part : {0.0, 0.1, 0.25, 0.5, 10.0}) {
+            SelectionView view = viewFrom({-0.05, 0.3, 0.6}, errorPixels);
+            view.paperReach = part;
+            const Selection selection = in.select(view);
+            EXPECT_TRUE(selection.complete);
+            std::set<uint64_t> fine;
+            for (const uint64_t page : selection.cut)
+                if (in.dataset.pages[page].level == 3) fine.insert(page);
+            const double reach = part * std::sqrt(3.0);
+            for (uint64_t page = 0; page < in.dataset.pages.size(); ++page) {
+                const PageEntry& entry = in.dataset.pages[page];
+                if (entry.level < 3) continue;
+                EXPECT_EQ(fine.contains(page), distanceTo(entry, view.eye) < reach) << page << " " << part;
+            }
+            double last = 0;
+            for (const WantedPage& wanted : selection.wanted) {
+                const PageEntry& entry = in.dataset.pages[wanted.page];
+                if (entry.level == 3) last = std::max(last, distanceTo(entry, view.eye));
+            }
+            EXPECT_LT(last, std::max(reach, 1e-9));
+        }
+}
+
+TEST(PageSelection, NearestOfThePapersSubvolumesGetTheBudget) {
+    const Input in(paperTree(4));
+    SelectionView view = viewFrom({-0.05, 0.05, 0.05});
+    view.paperReach = 10;
+    const Selection few = in.select(view, 40 * kPageBytes);
+    EXPECT_TRUE(few.relaxed);
+    EXPECT_LE(few.wanted.size(), 40u);
+    uint64_t fine = 0;
+    for (const uint64_t page : few.cut)
+        if (in.dataset.pages[page].level == 3) {
+            ++fine;
+            EXPECT_LT(glm::length(in.dataset.originOf(in.dataset.pages[page])), 0.7);
+        }
+    EXPECT_GE(fine, 8u);
+}
+
 TEST(PageSelection, NearerPagesAreFinerOrEqual) {
     const Input in(fullTree(5, 0.01));
     const SelectionView view = viewFrom({-0.2, 0.5, 0.5}, 2);

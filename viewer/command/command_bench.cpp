@@ -196,7 +196,7 @@ RunCommand addBenchRays(CLI::App& bench) {
         *app, *command,
         "Meshes, or .vcp files beside the meshes they were built from [a sphere, a torus and a thin plate]");
     app->add_option("--methods", command->methods,
-                    fmt::format("{} [all but paper-rules]", fmt::join(rayMethodNames(), ", ")))
+                    fmt::format("{} [all but paper-rules, paper-subvolumes]", fmt::join(rayMethodNames(), ", ")))
         ->type_name("A,B")
         ->delimiter(',')
         ->allow_extra_args(false);
@@ -223,10 +223,11 @@ RunCommand addBenchRays(CLI::App& bench) {
         ->capture_default_str()
         ->check(CLI::Range(1, 16384));
     app->add_option("--device", command->device,
-                    "Vulkan device of the methods certified and paper-gpu, see `vcp devices` [the best one]")
+                    "Vulkan device of the methods certified and paper-...gpu, see `vcp devices` [the best one]")
         ->type_name("DEVICE");
     addPaperMarchOptions(*app, command->paper.march);
     addPaperStructureOptions(*app, command->paper);
+    addPaperSubvolumesOption(*app, command->paper.subvolumeCells, "64, of the methods paper-subvolumes");
     return [command] { return runRays(*command); };
 }
 

@@ -121,9 +121,10 @@ Result<void> checkMethod(const BuildCommand& command) {
     if (!command.isPaper()) return {};
     if (s.error > 0 || s.colour == ColourChoice::Vertex || s.colour == ColourChoice::Texture)
         return usage("--method paper has neither a tolerance (--error) nor colour");
-    if (command.shardBytes > 0) return usage("--method paper makes one page, which is not cut into shards");
-    if (s.memoryBytes > 0 || !s.temp.empty() || command.resume || command.dryRun)
-        return usage("--method paper builds in memory: without --memory, --temp, --resume and --dry-run");
+    if (command.shardBytes > 0) return usage("--method paper makes files that are not cut into shards");
+    if (command.resume || command.dryRun) return usage("--method paper goes without --resume and --dry-run");
+    if (command.paper.subvolumeCells == 0 && (s.memoryBytes > 0 || !s.temp.empty()))
+        return usage("--method paper builds one page in memory: --memory and --temp go with --paper-subvolumes");
     return {};
 }
 
@@ -222,12 +223,13 @@ Command addBuild(CLI::App& vcp) {
     addBuildSettings(*app, command->settings, help_group::kBuilding);
     beginGroup(*app, help_group::kPaper);
     app->add_option("--method", command->method,
-                    "certified, or paper: their octree, for comparison (in memory, no colour, nothing certified)")
+                    "certified, or paper: their octree, for comparison (no colour, nothing certified)")
         ->type_name("certified|paper")
         ->capture_default_str()
         ->check(CLI::IsMember({"certified", "paper"}));
     addPaperStructureOptions(*app, command->paper);
     addPaperSchemeOption(*app, command->paper.mergeScheme);
+    addPaperSubvolumesOption(*app, command->paper.subvolumeCells, "one page, in memory");
     addProgressOption(*app, command->report);
     addJsonOption(*app, command->report);
     return {app, [command, app] {

@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "builder/paper/paper_subvolumes.h"
 #include "viewer/command/manual/help_text.h"
 
 namespace vcp {
@@ -66,6 +67,19 @@ void addPaperStructureOptions(CLI::App& app, PaperOptions& options) {
                     {{"published", false}, {"safe", true}});
 }
 
+void addPaperSubvolumesOption(CLI::App& app, int& cells, const std::string& otherwise) {
+    const ScopedGroup paper(app, help_group::kPaper);
+    std::vector<std::string> sizes;
+    for (int size = kLeastSubvolumeCells; size <= kMostSubvolumeCells; size *= 2) sizes.push_back(std::to_string(size));
+    app.add_option(
+           "--paper-subvolumes", cells,
+           fmt::format("Edge of subvolumes of finest cells, which are drawn where they are near, with one octree "
+                       "of larger cells for the rest [{}]",
+                       otherwise))
+        ->type_name(fmt::format("{}", fmt::join(sizes, "|")))
+        ->check(CLI::IsMember(sizes));
+}
+
 void addPaperSchemeOption(CLI::App& app, PaperScheme& scheme) {
     const ScopedGroup paper(app, help_group::kPaper);
     addChoice<PaperScheme>(
@@ -84,6 +98,11 @@ void addPaperMarchOptions(CLI::App& app, PaperMarch& march) {
                     {{"on", true}, {"off", false}});
     addChoice<bool>(app, "--paper-cache", march.cached, "A step reuses the node and vectors of the step before",
                     {{"on", true}, {"off", false}});
+    app.add_option("--paper-reach", march.reach,
+                   "Subvolumes nearer than this part of the dataset's diagonal are of finest cells")
+        ->type_name("PART")
+        ->capture_default_str()
+        ->check(CLI::Range(0.0, 1e6));
 }
 
 }  // namespace vcp

@@ -11,6 +11,8 @@ namespace vcp {
 void addPaperStructureOptions(CLI::App& app, PaperOptions& options);
 /// Adds the interpolation that merging is judged by: where a command has both, that of the march.
 void addPaperSchemeOption(CLI::App& app, PaperScheme& scheme);
+/// `otherwise`: what there is without the option.
+void addPaperSubvolumesOption(CLI::App& app, int& cells, const std::string& otherwise);
 /// Adds the options of the march, which may change from picture to picture.
 void addPaperMarchOptions(CLI::App& app, PaperMarch& march);
 

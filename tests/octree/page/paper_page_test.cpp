@@ -67,6 +67,9 @@ TEST(PaperPage, WrongPagesAreRefused) {
     refuses("longest", 36, 0.0f);
     refuses("leaves", 40, 13u);
     refuses("empty nodes", 44, 3u);
+    refuses("cells larger than the cube", 48, 4u);
+    refuses("roots of larger cells beyond the cube", 48, 1u);
+    refuses("reserved", 52, 1u);
     refuses("leaf beyond the slices", node(4), -3);
     refuses("the least leaf", node(4), std::numeric_limits<int32_t>::min());
     refuses("children that are roots", node(0), 1);
@@ -163,6 +166,78 @@ TEST_F(PaperFileTest, ComesBackAndIsNoCertifiedDataset) {
     ASSERT_FALSE(cache);
     EXPECT_EQ(cache.error().code, ErrorCode::Unsupported);
     EXPECT_NE(cache.error().line().find("the paper's method"), std::string::npos) << cache.error().line();
+}
+
+/// A file with a page for each entry, whatever these say.
+std::filesystem::path writePages(const std::filesystem::path& file, FileHeader header,
+                                 const std::vector<PageEntry>& entries, const std::vector<PageBytes>& pages) {
+    header.method = Method::Paper;
+    header.cell = 1;
+    header.log2Cells = 2;
+    header.paper.band = 3;
+    header.levels = entries.back().level + 1u;
+    for (const PageEntry& entry : entries) ++header.level[entry.level].pages;
+    for (uint32_t l = 1; l < header.levels; ++l)
+        header.level[l].firstEntry = header.level[l - 1].firstEntry + header.level[l - 1].pages;
+    auto writer = VcpWriter::create(file, entries.size());
+    EXPECT_TRUE(writer);
+    for (size_t i = 0; i < entries.size(); ++i)
+        EXPECT_TRUE((*writer)->append(entries[i], compressPage(pages[i].geometryBytes(), {})));
+    EXPECT_TRUE((*writer)->commit(header));
+    return file;
+}
+
+/// One root of 2^rootLevel cells, which is empty.
+PageBytes emptyPaperPage(uint32_t rootLevel, uint32_t cellShift = 0) {
+    PaperPageHeader h;
+    h.rootLevel = rootLevel;
+    h.roots[0] = h.roots[1] = h.roots[2] = h.nodes = h.emptyNodes = 1;
+    h.cutoff = h.longest = 1;
+    h.cellShift = cellShift;
+    PageBytes page;
+    page.geometry.resize(paperSections(h).end / 16);
+    std::memcpy(page.geometry.data(), &h, sizeof h);
+    const int32_t word = paper::kPaperEmpty;
+    std::memcpy(reinterpret_cast<std::byte*>(page.geometry.data()) + sizeof h, &word, sizeof word);
+    return page;
+}
+
+TEST_F(PaperFileTest, SubvolumesThatDoNotFitAreRefused) {
+    const auto file = folder_ / "cut.vcp";
+    const auto line = [&](const std::vector<PageEntry>& entries, const std::vector<PageBytes>& pages) {
+        FileHeader header;
+        header.leaves = entries.back().leaves;
+        const auto reader = openFile(writePages(file, header, entries, pages));
+        EXPECT_TRUE(reader);
+        const auto verified = verifyFile(**reader);
+        return verified ? std::string("as it should be") : verified.error().line();
+    };
+    const PageEntry root{.firstChild = 1, .childMask = 1}, between{.firstChild = 2, .childMask = 1, .level = 1},
+        finest{.level = 2};
+    const PageBytes large = emptyPaperPage(1, 2), small = emptyPaperPage(2);
+    EXPECT_EQ(line({root, between, finest}, {large, small, small}), "as it should be");
+    const auto expect = [&](const char* words, const std::vector<PageEntry>& entries,
+                            const std::vector<PageBytes>& pages) {
+        const std::string said = line(entries, pages);
+        EXPECT_NE(said.find(words), std::string::npos) << said;
+        EXPECT_EQ(said.find('\n'), std::string::npos);
+    };
+    expect("size of the cells", {root, between, finest}, {emptyPaperPage(1, 5), small, small});
+    expect("number of roots", {root, between, finest}, {emptyPaperPage(2, 3), small, small});
+    expect("do not fill", {root, between, finest}, {large, small, emptyPaperPage(1)});
+    expect("do not fill", {root, between, finest}, {large, small, emptyPaperPage(2, 1)});
+    expect("do not fill", {root, between, finest}, {large, emptyPaperPage(3), small});
+    PageEntry wrong = between;
+    wrong.leaves = 3;
+    expect("leaves between", {root, wrong, finest}, {large, small, small});
+    wrong = between;
+    wrong.childMask = 0, wrong.firstChild = 0;
+    expect("leads to no subvolume", {root, wrong, finest}, {large, small, small});
+    wrong = finest;
+    wrong.leaves = 1;
+    expect("has 0 leaves", {root, between, wrong}, {large, small, small});
+    const Error tooMany = refusal(write([](FileHeader& h) { h.log2Cells = 20, h.levels = 2, h.level[1].pages = 1; }));
+    EXPECT_NE(tooMany.line().find("more levels"), std::string::npos) << tooMany.line();
 }
 
 TEST_F(PaperFileTest, UnknownMethodsAreNamed) {

@@ -7,11 +7,15 @@
 #include <gtest/gtest.h>
 
 #include "builder/paper/grid_points.h"
+#include "builder/paper/paper_file.h"
 #include "builder/paper/paper_octree.h"
 #include "builder/paper/region_growing.h"
+#include "tests/support/mesh_files.h"
+#include "tests/support/test_folder.h"
 #include "tests/support/test_meshes.h"
 #include "viewer/bench/peers/distance_octree.h"
 #include "viewer/bench/peers/grid_rays.h"
+#include "viewer/bench/peers/subvolume_caster.h"
 #include "viewer/bench/peers/voxel_octree.h"
 #include "viewer/bench/rays/analytic_models.h"
 #include "viewer/bench/rays/bench_cameras.h"
@@ -19,6 +23,8 @@
 
 namespace vcp {
 namespace {
+
+namespace fs = std::filesystem;
 
 constexpr double kRadius = 16;
 constexpr int kRays = 4000;
@@ -393,6 +399,107 @@ TEST(MeshSides, BoxFromAllSides) {
         const bool inside = std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}) < 1;
         EXPECT_EQ(sides.isInside(p, *bvh.nearestPoint(p)), inside) << i;
     }
+}
+
+/// The same mesh as a file in subvolumes and as one octree over the same grid, cells of edge 0.05.
+class PaperInSubvolumes : public testing::Test {
+protected:
+    static constexpr double kCell = 0.05;
+    PaperInSubvolumes()
+        : folder_("vcp_subvolume_caster_test"), mesh_(test::torusMesh({0.3, 0.2, 0.1}, 2, 0.8, 90, 40)) {
+        const fs::path ply = folder_ / "mesh.ply", file = folder_ / "mesh.vcp";
+        test::writePly(mesh_, ply);
+        mesh_ = *loadMesh(ply);
+        bvh_.emplace(mesh_);
+        BuildOptions build;
+        build.inputs = {ply};
+        build.output = file;
+        build.cell = kCell;
+        PaperOptions paper;
+        paper.subvolumeCells = 16;
+        EXPECT_TRUE(buildPaperFile(build, paper));
+        auto opened = SubvolumeCaster::open(file, {});
+        EXPECT_TRUE(opened) << opened.error().line();
+        cut_.emplace(std::move(*opened));
+        whole_.emplace(*PaperCaster::create(*bvh_, {}, {.cell = kCell, .threads = 2}));
+    }
+    /// Casts rays through points near walls between subvolumes, from all around.
+    template <class Visit>
+    void forRaysNearWalls(const Visit& visit) const {
+        std::mt19937_64 random(11);
+        std::uniform_real_distribution<double> unit(0, 1);
+        for (int i = 0; i < kRays; ++i) {
+            TestRay ray = randomRay(random, 1, 0);
+            const double around = unit(random) * 2 * std::numbers::pi;
+            glm::dvec3 target =
+                glm::dvec3(0.3, 0.2, 0.1) + 2.0 * glm::dvec3(std::cos(around), std::sin(around), 0) + 0.5 * ray.origin;
+            // On a wall of the grid of subvolumes, or a hair beside it.
+            glm::dvec3 grid = cut_->frame().gridFromWorld(target) / 16.0;
+            grid[i % 3] = std::round(grid[i % 3]) + (unit(random) - 0.5) * 1e-3;
+            target = cut_->frame().worldFromGrid(grid * 16.0);
+            visit(TestRay{target - 8.0 * ray.direction, ray.direction});
+        }
+    }
+
+    TestFolder folder_;
+    IndexedMesh mesh_;
+    std::optional<MeshBvh> bvh_;
+    std::optional<SubvolumeCaster> cut_;
+    std::optional<PaperCaster> whole_;
+};
+
+TEST_F(PaperInSubvolumes, HitWhatTheOneOctreeHits) {
+    cut_->setMarch({.reach = 1e6f});
+    int both = 0, different = 0;
+    forRaysNearWalls([&](const TestRay& ray) {
+        const double cut = castWorld(*cut_, ray), whole = castWorld(*whole_, ray);
+        both += std::isfinite(cut) && std::isfinite(whole) ? 1 : 0;
+        // They start elsewhere, so a ray may pass an outline on its other side.
+        const bool isSame = std::isfinite(cut) && std::isfinite(whole) ? std::abs(cut - whole) < 0.2 * kCell
+                                                                       : std::isinf(cut) == std::isinf(whole);
+        different += isSame ? 0 : 1;
+    });
+    EXPECT_GT(both, kRays / 2);
+    EXPECT_LE(different, kRays / 200);
+    EXPECT_GT(cut_->subvolumes(), 100u);
+}
+
+TEST_F(PaperInSubvolumes, NoRaySlipsThroughWallsOrWhereTheTwoLevelsMeet) {
+    for (const float reach : {0.0f, 0.25f, 0.6f, 1e6f}) {
+        cut_->setMarch({.reach = reach});
+        int hits = 0, missed = 0, wrong = 0;
+        double farthest = 0;
+        forRaysNearWalls([&](const TestRay& ray) {
+            const auto exact = bvh_->nearestHit(ray.origin, ray.direction);
+            const double t = castWorld(*cut_, ray);
+            if (!exact) return;
+            ++hits;
+            if (!std::isfinite(t)) {
+                ++missed;
+                return;
+            }
+            wrong += t > exact->t + 20 * kCell ? 1 : 0;
+            farthest = std::max(farthest, bvh_->nearestPoint(ray.origin + t * ray.direction)->distance / kCell);
+        });
+        EXPECT_GT(hits, kRays / 2);
+        EXPECT_EQ(missed, 0) << reach;
+        EXPECT_LE(wrong, hits / 1000) << reach;
+        EXPECT_LT(farthest, reach > 1 ? 0.5 : 2.0) << "cells; the larger ones are four wide";
+        EXPECT_TRUE(reach > 0 || farthest > 0.8) << farthest;
+    }
+}
+
+TEST(SubvolumeCaster, OtherFilesAreRefused) {
+    const TestFolder folder("vcp_subvolume_caster_test");
+    test::writePly(test::sphereMesh({0, 0, 0}, 1, 8), folder / "mesh.ply");
+    BuildOptions build;
+    build.inputs = {folder / "mesh.ply"};
+    build.output = folder / "one.vcp";
+    build.cell = 0.2;
+    ASSERT_TRUE(buildPaperFile(build, {}));
+    const auto opened = SubvolumeCaster::open(build.output, {});
+    ASSERT_FALSE(opened);
+    EXPECT_EQ(opened.error().code, ErrorCode::Usage);
 }
 
 TEST(PaperPacking, VectorsSurvive) {

@@ -4,8 +4,10 @@
 
 #include <fmt/format.h>
 
+#include "builder/paper/paper_file.h"
 #include "viewer/bench/peers/distance_octree.h"
 #include "viewer/bench/peers/paper_dataset.h"
+#include "viewer/bench/peers/subvolume_caster.h"
 #include "viewer/bench/peers/voxel_octree.h"
 #include "viewer/bench/rays/peer_tracer.h"
 
@@ -25,6 +27,8 @@ const std::vector<RayMethod> kMethods = {{"certified", 0.5, {0.5, 1, 2, 4}},
                                          {"paper", 0.25, {0.5, 0.25, 0.1}},
                                          {"paper-onward", 0.25, {0.5, 0.25, 0.1}},
                                          {"paper-gpu", 0.25, {0.5, 0.25, 0.1}},
+                                         {"paper-subvolumes", 0.25, {0.5, 0.25, 0.1}},
+                                         {"paper-subvolumes-gpu", 0.25, {0.5, 0.25, 0.1}},
                                          {"paper-rules"},
                                          {"sdf", 1, {2, 1, 0.5}},
                                          {"sdf-analytic", 1, {2, 1, 0.5}},
@@ -75,6 +79,10 @@ const std::vector<std::string>& rayMethodNames() {
     return names;
 }
 
+bool isUsualRayMethod(const std::string& method) {
+    return method != "paper-rules" && !method.starts_with("paper-subvolumes");
+}
+
 std::vector<double> rayMethodKnobs(const std::string& method, bool sweep) {
     const auto found = std::ranges::find(kMethods, method, &RayMethod::name);
     if (found == kMethods.end()) return {};
@@ -103,6 +111,7 @@ Result<std::unique_ptr<RayTracer>> RayMethods::make(const std::string& method, d
     paper.march.epsilon = float(knob);
     if (method == "paper") return makePaper(paper, fmt::format("eps {:g}", knob));
     if (method == "paper-gpu") return makePaperGpu(paper);
+    if (method.starts_with("paper-subvolumes")) return makeSubvolumes(paper, method != "paper-subvolumes");
     if (method == "paper-onward") {
         paper.march.step = PaperStep::Onward;
         return makePaper(paper, fmt::format("eps {:g}", knob));
@@ -134,6 +143,32 @@ Result<std::unique_ptr<RayTracer>> RayMethods::makePaperGpu(const PaperOptions& 
     VCP_TRY_ASSIGN(const auto made, paperOf(options));
     VCP_TRY_ASSIGN(const auto dataset, paperDataset(*made, in_.mesh));
     return makePaperGpuTracer(dataset.dataset, dataset.source, in_.device, options.march);
+}
+
+Result<std::filesystem::path> RayMethods::subvolumesOf(const PaperOptions& options) {
+    if (!subvolumes_.empty()) return subvolumes_;
+    constexpr int kUsualCells = 64;
+    PaperOptions paper = options;
+    if (paper.subvolumeCells == 0) paper.subvolumeCells = kUsualCells;
+    BuildOptions build;
+    build.inputs = {in_.meshFile};
+    build.output = in_.folder / (in_.meshFile.stem().string() + ".paper.vcp");
+    build.cell = in_.cell;
+    build.threads = in_.threads;
+    VCP_TRY(buildPaperFile(build, paper));
+    return subvolumes_ = build.output;
+}
+
+Result<std::unique_ptr<RayTracer>> RayMethods::makeSubvolumes(const PaperOptions& options, bool onDevice) {
+    VCP_TRY_ASSIGN(const auto file, subvolumesOf(options));
+    if (!onDevice) {
+        VCP_TRY_ASSIGN(auto caster, SubvolumeCaster::open(file, options.march));
+        return tracerOf(std::move(caster), fmt::format("eps {:g}", options.march.epsilon), in_.threads);
+    }
+    VCP_TRY_ASSIGN(const auto reader, openFile(file));
+    VCP_TRY_ASSIGN(auto dataset, readDataset(*reader));
+    const auto shared = std::make_shared<const Dataset>(std::move(dataset));
+    return makePaperGpuTracer(shared, std::make_shared<FilePageSource>(reader, shared), in_.device, options.march);
 }
 
 Result<std::unique_ptr<RayTracer>> RayMethods::makeDistances(bool analytic, double cells) {

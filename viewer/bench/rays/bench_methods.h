@@ -7,6 +7,8 @@
 //   paper          Demir and Westermann 2015 (builder/paper/paper_octree.h)        eps  0.25; swept 0.5, 0.25, 0.1
 //   paper-onward   the same, steps by the plane up to 2 eps beyond the distance   eps, as paper
 //   paper-gpu      the same march over the same octree on a Vulkan device   eps, as paper
+//   paper-subvolumes      the same march over the file in subvolumes (builder/paper/paper_subvolumes.h)      eps, as
+//   paper paper-subvolumes-gpu  the same on a Vulkan device, which loads those that the view needs   eps, as paper
 //   paper-rules    the same with one rule changed at a time                the rule; all of them, always
 //   sdf            signed-distance octree (viewer/bench/peers/distance_octree.h)        cell  1; swept 2, 1, 0.5
 //   sdf-analytic   trilinear distance, cubic roots (the same)              cell  1; swept 2, 1, 0.5
@@ -32,6 +34,8 @@ namespace vcp {
 
 /// Returns the names, in the order of the table above.
 const std::vector<std::string>& rayMethodNames();
+/// Whether a method is run where none is named: others take as long as all of these, or show no method of its own.
+bool isUsualRayMethod(const std::string& method);
 /// Returns the default alone, or all values that are swept; a single 0 for a method without a knob.
 std::vector<double> rayMethodKnobs(const std::string& method, bool sweep);
 
@@ -45,8 +49,9 @@ public:
         std::filesystem::path vcp;
         std::string device;
         unsigned threads = 0;
-        double cell = 1;          ///< finest edge of the .vcp, world units
-        PaperOptions paper = {};  ///< options of `paper`; its epsilon is the knob
+        double cell = 1;                                   ///< finest edge of the .vcp, world units
+        PaperOptions paper = {};                           ///< options of `paper`; its epsilon is the knob
+        std::filesystem::path meshFile = {}, folder = {};  ///< of the mesh; for the file in subvolumes
     };
     explicit RayMethods(Inputs inputs) : in_(std::move(inputs)) {}
 
@@ -58,12 +63,16 @@ private:
     Result<const PaperCaster*> paperOf(const PaperOptions& options);
     Result<std::unique_ptr<RayTracer>> makePaper(const PaperOptions& options, std::string knob);
     Result<std::unique_ptr<RayTracer>> makePaperGpu(const PaperOptions& options);
+    /// Builds the file in subvolumes, once.
+    Result<std::filesystem::path> subvolumesOf(const PaperOptions& options);
+    Result<std::unique_ptr<RayTracer>> makeSubvolumes(const PaperOptions& options, bool onDevice);
     Result<std::unique_ptr<RayTracer>> makeDistances(bool analytic, double cells);
     Result<std::unique_ptr<RayTracer>> makeVoxels(bool contours, double cells) const;
 
     Inputs in_;
     std::optional<MeshSides> sides_;
     std::optional<PaperCaster> paper_;
+    std::filesystem::path subvolumes_;  // empty: the file is not built
 };
 
 }  // namespace vcp

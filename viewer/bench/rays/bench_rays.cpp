@@ -22,7 +22,7 @@ public:
     explicit RaysBench(const BenchRaysOptions& options) : options_(options), folder_(options.out) {
         if (options_.methods.empty())
             for (const std::string& method : rayMethodNames())
-                if ((benchHasEmbree() || !method.starts_with("embree")) && method != "paper-rules")
+                if ((benchHasEmbree() || !method.starts_with("embree")) && isUsualRayMethod(method))
                     options_.methods.push_back(method);
     }
 
@@ -69,7 +69,7 @@ private:
             VCP_TRY_ASSIGN(peer, makeEmbreeTracer(m.mesh, true, options_.threads));
         }
         RayMethods methods({m.mesh, *m.bvh, *m.cache, m.files.vcp, options_.device, options_.threads,
-                            m.cache->dataset().header.cell, options_.paper});
+                            m.cache->dataset().header.cell, options_.paper, m.files.mesh, folder_.path()});
         size_t runs = 0, done = 0;
         for (const std::string& method : options_.methods) runs += knobsOf(method).size() * options_.cameras.size();
         const auto fraction = [&] { return 0.1 + 0.9 * double(done) / double(runs); };
@@ -88,7 +88,7 @@ private:
     }
 
     [[nodiscard]] std::vector<double> knobsOf(const std::string& method) const {
-        if ((method == "paper" || method == "paper-onward" || method == "paper-gpu") && !options_.sweep)
+        if (method.starts_with("paper") && method != "paper-rules" && !options_.sweep)
             return {options_.paper.march.epsilon};
         return rayMethodKnobs(method, options_.sweep);
     }

@@ -26,7 +26,7 @@ namespace vcp {
 struct BenchRaysOptions {
     /// Meshes, or .vcp files beside which the mesh of the same name lies; none: viewer/bench/rays/analytic_models.h.
     std::vector<std::filesystem::path> models;
-    std::vector<std::string> methods;  ///< empty: all that this build has, except paper-rules
+    std::vector<std::string> methods;  ///< empty: all that this build has and isUsualRayMethod() names
     bool sweep = false;                ///< each method at several values of its knob, instead of its default alone
     std::vector<std::string> cameras = {"whole", "half", "close", "cells"};
     glm::ivec2 size{1920, 1200};
