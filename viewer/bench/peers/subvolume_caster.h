@@ -64,7 +64,7 @@ GridHit SubvolumeCaster::cast(const GridRay& ray, Work& work) const {
         work.step();
         const glm::vec3 p = ray.origin + t * ray.direction;
         const glm::ivec3 cell = cellAt(p, last);
-        if (cell >> level_ != subvolume || !march_.cached) {
+        if ((cell >> level_) != subvolume || !march_.cached) {
             subvolume = cell >> level_;
             const Page& next = pageAt(subvolume, eye);
             if (&next != page || !march_.cached) {
