@@ -21,6 +21,7 @@ namespace {
 constexpr uint64_t kAlignment = 64;
 constexpr uint32_t kMaxChunks = 64;
 constexpr uint64_t kMaxFileBytes = uint64_t{1} << 34;
+constexpr size_t kPieceBytes = size_t{1} << 24;
 
 using Bytes = std::vector<std::byte>;
 
@@ -47,7 +48,9 @@ private:
 /// Reads values whose sizes must fit exactly; after the first error nothing more is read.
 class In {
 public:
-    explicit In(std::span<const std::byte> bytes) : left_(bytes) {}
+    /// `file`: which the bytes are in; null: in main memory.
+    explicit In(std::span<const std::byte> bytes, std::shared_ptr<const FileMemory> file)
+        : left_(bytes), file_(std::move(file)) {}
     template <class T>
     T one() {
         T value{};
@@ -68,6 +71,17 @@ public:
         left_ = left_.subspan(count * sizeof(T));
         return values;
     }
+    HeightTexels heights(uint64_t count) {
+        if (!file_) return all<uint16_t>(count);
+        if (!ok_ || count != left_.size() / sizeof(uint16_t)) {
+            ok_ = false;
+            return {};
+        }
+        // Chunks are on 64 bytes.
+        const auto* first = reinterpret_cast<const uint16_t*>(left_.data());
+        left_ = left_.subspan(count * sizeof(uint16_t));
+        return {file_, std::span(first, count)};
+    }
     TileGrid grid(glm::dvec3 extent) {
         const auto cells = one<glm::ivec3>();
         for (int axis = 0; axis < 3; ++axis) ok_ = ok_ && cells[axis] >= 1 && cells[axis] <= kMaxGridEdge;
@@ -82,6 +96,7 @@ public:
 
 private:
     std::span<const std::byte> left_;
+    std::shared_ptr<const FileMemory> file_;
     bool ok_ = true;
 };
 
@@ -192,16 +207,42 @@ std::shared_ptr<const TransferVolume> readTransfer(In& in, glm::dvec3 extent) {
     return volume;
 }
 
-std::vector<std::pair<ChunkKind, Bytes>> chunksOf(const Asset& a) {
-    std::vector<std::pair<ChunkKind, Bytes>> chunks;
+/// What a chunk has: bytes of its own, then heights, which are the asset's.
+struct ChunkContent {
+    ChunkKind kind;
+    Bytes bytes;
+    HeightTexels heights = {};
+
+    [[nodiscard]] uint64_t size() const { return bytes.size() + heights.size() * sizeof(uint16_t); }
+};
+
+/// Calls take(piece) -> Result<void> for bytes piece by piece. What was read of a file does not stay in main memory.
+template <class Take>
+Result<void> eachPiece(std::span<const std::byte> bytes, const auto& from, Take&& take) {
+    for (size_t at = 0; at < bytes.size(); at += kPieceBytes) {
+        VCP_TRY(take(bytes.subspan(at, std::min(kPieceBytes, bytes.size() - at))));
+        from.letGo();
+    }
+    return {};
+}
+
+template <class Take>
+Result<void> eachPiece(const ChunkContent& chunk, Take&& take) {
+    VCP_TRY(take(std::span<const std::byte>(chunk.bytes)));
+    return eachPiece(std::as_bytes(std::span(chunk.heights)), chunk.heights, take);
+}
+
+std::vector<ChunkContent> chunksOf(const Asset& a) {
+    std::vector<ChunkContent> chunks;
     const auto add = [&](ChunkKind kind, const auto& write) {
         Out out;
         write(out);
-        chunks.emplace_back(kind, std::move(out.bytes));
+        chunks.push_back({kind, std::move(out.bytes)});
     };
-    if (a.heights)
-        add(ChunkKind::Heights,
-            [&](Out& o) { o.one(a.heights->size), o.one(a.heights->range), o.all(a.heights->texels); });
+    if (a.heights) {
+        add(ChunkKind::Heights, [&](Out& o) { o.one(a.heights->size), o.one(a.heights->range); });
+        chunks.back().heights = a.heights->texels;
+    }
     if (!a.solid.empty())
         add(ChunkKind::Solid, [&](Out& o) {
             o.one(a.seed), o.one(uint32_t(a.solid.size())), o.all(std::vector<char>(a.solid.begin(), a.solid.end()));
@@ -273,7 +314,7 @@ bool readChunk(ChunkKind kind, In& in, Asset& a) {
             const glm::ivec2 size = a.heights->size;
             in.require(size.x >= 1 && size.y >= 1 && size.x <= kMaxMapEdge && size.y <= kMaxMapEdge &&
                        a.heights->extent() == extent);
-            a.heights->texels = in.all<uint16_t>(in.ok() ? uint64_t(size.x) * uint64_t(size.y) : 0);
+            a.heights->texels = in.heights(in.ok() ? uint64_t(size.x) * uint64_t(size.y) : 0);
             break;
         }
         case ChunkKind::Solid: {
@@ -393,6 +434,99 @@ Result<GdmMap> mapOf(const Asset& asset, const Shape& shape, const AssetOptions:
     return packMap(std::move(table), options.rank, options.bits, options.withVisibility, std::move(properties));
 }
 
+uint64_t hashOf(std::span<const std::byte> bytes, const std::shared_ptr<const FileMemory>& file) {
+    if (!file) return hashBytes(bytes);
+    ContentHash hash;
+    static_cast<void>(eachPiece(bytes, *file, [&](std::span<const std::byte> piece) {
+        hash.add(piece);
+        return Result<void>();
+    }));
+    return hash.value();
+}
+
+/// Reads an asset from bytes that may be hostile. `file`: which they are in; null: in main memory.
+Result<Asset> parsed(std::span<const std::byte> bytes, const std::string& name,
+                     const std::shared_ptr<const FileMemory>& file) {
+    const auto fail = [&](const char* element, uint64_t byte, std::string message) {
+        return Error{.code = ErrorCode::InvalidInput,
+                     .message = std::move(message),
+                     .file = name,
+                     .element = element,
+                     .byte = byte};
+    };
+    AssetHeader header;
+    if (bytes.size() < sizeof header + sizeof(AssetCommit))
+        return fail("header", bytes.size(),
+                    bytes.empty() ? "the file is empty" : "the file is too short for a mesostructure asset");
+    std::memcpy(&header, bytes.data(), sizeof header);
+    if (std::memcmp(header.magic, AssetHeader{}.magic, 8) != 0)
+        return fail("header", 0, "not a mesostructure asset; make one with `vcp meso build`");
+    if (header.version != kAssetVersion)
+        return Error{.code = ErrorCode::Unsupported,
+                     .message = fmt::format("asset version {} is not known; this program reads version {}",
+                                            header.version, kAssetVersion),
+                     .file = name,
+                     .element = "header",
+                     .byte = 8};
+    if (hashBytes(bytes.first(offsetof(AssetHeader, hash))) != header.hash || header.padding != 0)
+        return fail("header", 0, "the header's hash does not match: the file was changed or damaged");
+    if (header.fileBytes != bytes.size())
+        return fail("header", 16,
+                    fmt::format("the file should have {} bytes, it has {}", header.fileBytes, bytes.size()));
+    if (header.chunks > kMaxChunks ||
+        sizeof header + header.chunks * sizeof(AssetChunk) + sizeof(AssetCommit) > bytes.size())
+        return fail("header", 12, "chunk count out of range");
+    for (const double edge : header.extent)
+        if (!(edge > 0) || !(edge <= 64)) return fail("header", 24, "the tile's extent is out of range");
+    if (header.name[sizeof header.name - 1] != 0) return fail("header", 56, "the name does not end");
+
+    AssetCommit commit;
+    const uint64_t commitAt = bytes.size() - sizeof commit;
+    std::memcpy(&commit, bytes.data() + commitAt, sizeof commit);
+    if (std::memcmp(commit.magic, AssetCommit{}.magic, 8) != 0 || commit.fileBytes != bytes.size() ||
+        commit.headerHash != header.hash ||
+        commit.hash != hashBytes(bytes.subspan(commitAt, offsetof(AssetCommit, hash))))
+        return fail("commit record", commitAt, "does not match the file: it was not finished, changed or damaged");
+
+    std::vector<AssetChunk> table(header.chunks);
+    const auto stored = bytes.subspan(sizeof header, table.size() * sizeof(AssetChunk));
+    if (hashBytes(stored) != header.tableHash)
+        return fail("chunk table", sizeof header, "hash does not match: the file was changed or damaged");
+    if (!table.empty()) std::memcpy(table.data(), stored.data(), stored.size());
+    Asset asset;
+    asset.name = header.name;
+    asset.extent = {header.extent[0], header.extent[1], header.extent[2]};
+    uint64_t end = sizeof header + stored.size(), known = 0;
+    for (const AssetChunk& chunk : table) {
+        if (chunk.offset < end || chunk.offset - end >= kAlignment || chunk.offset % kAlignment != 0 ||
+            chunk.bytes > commitAt || chunk.offset > commitAt - chunk.bytes)
+            return fail("chunk table", sizeof header, "a chunk lies outside the file or overlaps another");
+        for (uint64_t i = end; i < chunk.offset; ++i)
+            if (bytes[i] != std::byte{0}) return fail("padding", i, "is not zero: the file was changed or damaged");
+        const auto content = bytes.subspan(chunk.offset, chunk.bytes);
+        if (hashOf(content, file) != chunk.hash)
+            return fail("chunk", chunk.offset, "hash does not match: the file was changed or damaged");
+        const auto kind = uint32_t(chunk.kind);
+        if (kind >= 64 || kind == 0 || kind > uint32_t(ChunkKind::ViewDependent))
+            return Error{.code = ErrorCode::Unsupported,
+                         .message = fmt::format("chunk kind {} is not known: use a newer program", kind),
+                         .file = name,
+                         .element = "chunk table",
+                         .byte = chunk.offset};
+        if (known >> kind & 1) return fail("chunk table", chunk.offset, "two chunks of one kind");
+        known |= uint64_t{1} << kind;
+        In in(content, file);
+        if (!readChunk(chunk.kind, in, asset))
+            return fail("chunk", chunk.offset, fmt::format("chunk of kind {} is not what it says", kind));
+        end = chunk.offset + chunk.bytes;
+    }
+    for (uint64_t i = end; i < commitAt; ++i)
+        if (bytes[i] != std::byte{0}) return fail("padding", i, "is not zero: the file was changed or damaged");
+    if (commitAt - end >= kAlignment) return fail("padding", end, "unexpected bytes before the commit record");
+    if (!belongTogether(asset)) return fail("chunks", 0, "the chunks do not belong together");
+    return asset;
+}
+
 }  // namespace
 
 Result<std::unique_ptr<Shape>> shapeOf(const Asset& asset) {
@@ -469,8 +603,13 @@ Result<uint64_t> writeAsset(const std::filesystem::path& path, const Asset& asse
     const auto aligned = [](uint64_t at) { return (at + kAlignment - 1) / kAlignment * kAlignment; };
     uint64_t end = aligned(sizeof header + table.size() * sizeof(AssetChunk));
     for (size_t i = 0; i < chunks.size(); ++i) {
-        table[i] = {chunks[i].first, 0, end, chunks[i].second.size(), hashBytes(chunks[i].second)};
-        end = aligned(end + chunks[i].second.size());
+        ContentHash hash;
+        VCP_TRY(eachPiece(chunks[i], [&](std::span<const std::byte> piece) {
+            hash.add(piece);
+            return Result<void>();
+        }));
+        table[i] = {chunks[i].kind, 0, end, chunks[i].size(), hash.value()};
+        end = aligned(end + chunks[i].size());
     }
     header.fileBytes = end + sizeof(AssetCommit);
     header.tableHash = hashBytes(std::as_bytes(std::span(table)));
@@ -483,7 +622,13 @@ Result<uint64_t> writeAsset(const std::filesystem::path& path, const Asset& asse
     if (::ftruncate(file.descriptor(), off_t(header.fileBytes)) != 0)
         return systemError(path, "cannot write here", errno);
     VCP_TRY(file.write(sizeof header, std::as_bytes(std::span(table))));
-    for (size_t i = 0; i < chunks.size(); ++i) VCP_TRY(file.write(table[i].offset, chunks[i].second));
+    for (size_t i = 0; i < chunks.size(); ++i) {
+        uint64_t at = table[i].offset;
+        VCP_TRY(eachPiece(chunks[i], [&](std::span<const std::byte> piece) {
+            const uint64_t to = std::exchange(at, at + piece.size());
+            return file.write(to, piece);
+        }));
+    }
     VCP_TRY(file.sync());
     VCP_TRY(file.write(0, std::as_bytes(std::span(&header, 1))));
     VCP_TRY(file.write(end, std::as_bytes(std::span(&commit, 1))));
@@ -491,7 +636,7 @@ Result<uint64_t> writeAsset(const std::filesystem::path& path, const Asset& asse
     return header.fileBytes;
 }
 
-Result<Asset> readAsset(const std::filesystem::path& path) {
+Result<Asset> readAsset(const std::filesystem::path& path, const HeightStore& store) {
     VCP_TRY_ASSIGN(const auto reader, openFile(path));
     if (reader->size() > kMaxFileBytes)
         return Error{
@@ -506,90 +651,17 @@ Result<Asset> readAsset(const std::filesystem::path& path) {
                          .element = "header",
                          .byte = 0};
     }
+    if (reader->size() > store.mostInMemory * sizeof(uint16_t)) {
+        VCP_TRY_ASSIGN(const auto file, FileMemory::copyOf(*reader, store.folder));
+        return parsed(file->bytes(), path.string(), file);
+    }
     Bytes bytes(reader->size());
     VCP_TRY(reader->read(0, bytes));
     return parseAsset(bytes, path.string());
 }
 
 Result<Asset> parseAsset(std::span<const std::byte> bytes, const std::string& name) {
-    const auto fail = [&](const char* element, uint64_t byte, std::string message) {
-        return Error{.code = ErrorCode::InvalidInput,
-                     .message = std::move(message),
-                     .file = name,
-                     .element = element,
-                     .byte = byte};
-    };
-    AssetHeader header;
-    if (bytes.size() < sizeof header + sizeof(AssetCommit))
-        return fail("header", bytes.size(),
-                    bytes.empty() ? "the file is empty" : "the file is too short for a mesostructure asset");
-    std::memcpy(&header, bytes.data(), sizeof header);
-    if (std::memcmp(header.magic, AssetHeader{}.magic, 8) != 0)
-        return fail("header", 0, "not a mesostructure asset; make one with `vcp meso build`");
-    if (header.version != kAssetVersion)
-        return Error{.code = ErrorCode::Unsupported,
-                     .message = fmt::format("asset version {} is not known; this program reads version {}",
-                                            header.version, kAssetVersion),
-                     .file = name,
-                     .element = "header",
-                     .byte = 8};
-    if (hashBytes(bytes.first(offsetof(AssetHeader, hash))) != header.hash || header.padding != 0)
-        return fail("header", 0, "the header's hash does not match: the file was changed or damaged");
-    if (header.fileBytes != bytes.size())
-        return fail("header", 16,
-                    fmt::format("the file should have {} bytes, it has {}", header.fileBytes, bytes.size()));
-    if (header.chunks > kMaxChunks ||
-        sizeof header + header.chunks * sizeof(AssetChunk) + sizeof(AssetCommit) > bytes.size())
-        return fail("header", 12, "chunk count out of range");
-    for (const double edge : header.extent)
-        if (!(edge > 0) || !(edge <= 64)) return fail("header", 24, "the tile's extent is out of range");
-    if (header.name[sizeof header.name - 1] != 0) return fail("header", 56, "the name does not end");
-
-    AssetCommit commit;
-    const uint64_t commitAt = bytes.size() - sizeof commit;
-    std::memcpy(&commit, bytes.data() + commitAt, sizeof commit);
-    if (std::memcmp(commit.magic, AssetCommit{}.magic, 8) != 0 || commit.fileBytes != bytes.size() ||
-        commit.headerHash != header.hash ||
-        commit.hash != hashBytes(bytes.subspan(commitAt, offsetof(AssetCommit, hash))))
-        return fail("commit record", commitAt, "does not match the file: it was not finished, changed or damaged");
-
-    std::vector<AssetChunk> table(header.chunks);
-    const auto stored = bytes.subspan(sizeof header, table.size() * sizeof(AssetChunk));
-    if (hashBytes(stored) != header.tableHash)
-        return fail("chunk table", sizeof header, "hash does not match: the file was changed or damaged");
-    if (!table.empty()) std::memcpy(table.data(), stored.data(), stored.size());
-    Asset asset;
-    asset.name = header.name;
-    asset.extent = {header.extent[0], header.extent[1], header.extent[2]};
-    uint64_t end = sizeof header + stored.size(), known = 0;
-    for (const AssetChunk& chunk : table) {
-        if (chunk.offset < end || chunk.offset - end >= kAlignment || chunk.offset % kAlignment != 0 ||
-            chunk.bytes > commitAt || chunk.offset > commitAt - chunk.bytes)
-            return fail("chunk table", sizeof header, "a chunk lies outside the file or overlaps another");
-        for (uint64_t i = end; i < chunk.offset; ++i)
-            if (bytes[i] != std::byte{0}) return fail("padding", i, "is not zero: the file was changed or damaged");
-        const auto content = bytes.subspan(chunk.offset, chunk.bytes);
-        if (hashBytes(content) != chunk.hash)
-            return fail("chunk", chunk.offset, "hash does not match: the file was changed or damaged");
-        const auto kind = uint32_t(chunk.kind);
-        if (kind >= 64 || kind == 0 || kind > uint32_t(ChunkKind::ViewDependent))
-            return Error{.code = ErrorCode::Unsupported,
-                         .message = fmt::format("chunk kind {} is not known: use a newer program", kind),
-                         .file = name,
-                         .element = "chunk table",
-                         .byte = chunk.offset};
-        if (known >> kind & 1) return fail("chunk table", chunk.offset, "two chunks of one kind");
-        known |= uint64_t{1} << kind;
-        In in(content);
-        if (!readChunk(chunk.kind, in, asset))
-            return fail("chunk", chunk.offset, fmt::format("chunk of kind {} is not what it says", kind));
-        end = chunk.offset + chunk.bytes;
-    }
-    for (uint64_t i = end; i < commitAt; ++i)
-        if (bytes[i] != std::byte{0}) return fail("padding", i, "is not zero: the file was changed or damaged");
-    if (commitAt - end >= kAlignment) return fail("padding", end, "unexpected bytes before the commit record");
-    if (!belongTogether(asset)) return fail("chunks", 0, "the chunks do not belong together");
-    return asset;
+    return parsed(bytes, name, nullptr);
 }
 
 }  // namespace vcp::meso

@@ -139,8 +139,9 @@ Result<void> buildAsset(Asset& asset, const AssetOptions& options);
 
 /// Writes an asset and returns the file's bytes. Errors: Io.
 Result<uint64_t> writeAsset(const std::filesystem::path& path, const Asset& asset, const OutputRules& rules = {});
-/// Reads an asset. Errors: Io; InvalidInput, Unsupported with file, element and byte.
-Result<Asset> readAsset(const std::filesystem::path& path);
+/// Reads an asset; heights that are many stay in a file of the store. Errors: Io; InvalidInput, Unsupported with file,
+/// element and byte.
+Result<Asset> readAsset(const std::filesystem::path& path, const HeightStore& store = {});
 /// Reads an asset from bytes that may be hostile; `name` is the file's name in errors.
 Result<Asset> parseAsset(std::span<const std::byte> bytes, const std::string& name);
 

@@ -107,9 +107,9 @@ constexpr std::array<std::string_view, 11> kHeightFieldNames{
     "fbm", "ridged", "hemispheres", "maze", "blocks", "bricks", "ripple", "needle", "edge", "bark", "cobble"};
 
 /// Carves a maze by recursive backtracking on a torus of 8 x 8 rooms; walls are an eighth of a room, or one texel.
-void carveMaze(HeightMap& map, uint32_t seed) {
+void carveMaze(std::vector<uint16_t>& heights, int n, uint32_t seed) {
     constexpr int rooms = 8;
-    const int n = map.size.x, thick = std::max(1, n / (8 * rooms));
+    const int thick = std::max(1, n / (8 * rooms));
     std::array<std::array<bool, 2>, rooms * rooms> open{};  // whether a room is open towards +x, +y
     std::array<bool, rooms * rooms> seen{};
     std::vector<int> path{0};
@@ -134,7 +134,7 @@ void carveMaze(HeightMap& map, uint32_t seed) {
             const int i = x * rooms / n, j = y * rooms / n, room = i + rooms * j;
             const bool right = (i + 1) * n / rooms - x <= thick, top = (j + 1) * n / rooms - y <= thick;
             const bool wall = (right && top) || (right && !open[room][0]) || (top && !open[room][1]);
-            map.texels[size_t(y) * n + x] = wall ? 65535 : 0;
+            heights[size_t(y) * n + x] = wall ? 65535 : 0;
         }
 }
 
@@ -149,21 +149,22 @@ Result<HeightMap> makeHeightField(std::string_view name, int texels, uint32_t se
         return Error{
             .code = ErrorCode::Usage,
             .message = fmt::format("a height field of {} texels; it must be from 8 to {}", texels, kMaxMapEdge)};
-    HeightMap map{{texels, texels}, 0.15, std::vector<uint16_t>(size_t(texels) * size_t(texels))};
-    if (name == "maze") map.range = 0.06, carveMaze(map, seed);
-    if (name == "needle") map.texels[size_t(texels / 2) * texels + texels / 2] = 65535;
+    double range = 0.15;
+    std::vector<uint16_t> heights(size_t(texels) * size_t(texels));
+    if (name == "maze") range = 0.06, carveMaze(heights, texels, seed);
+    if (name == "needle") heights[size_t(texels / 2) * texels + texels / 2] = 65535;
     if (name == "edge")
-        for (int y = 0; y < texels; ++y) map.texels[size_t(y) * texels + texels / 2] = 65535;
+        for (int y = 0; y < texels; ++y) heights[size_t(y) * texels + texels / 2] = 65535;
     for (const Named& formula : kFormulas) {
         if (formula.name != name) continue;
-        map.range = formula.range;
+        range = formula.range;
         for (int y = 0; y < texels; ++y)
             for (int x = 0; x < texels; ++x) {
                 const double height = formula.height(double(x) / texels, double(y) / texels, seed);
-                map.texels[size_t(y) * texels + x] = uint16_t(std::lround(65535 * std::clamp(height, 0.0, 1.0)));
+                heights[size_t(y) * texels + x] = uint16_t(std::lround(65535 * std::clamp(height, 0.0, 1.0)));
             }
     }
-    return map;
+    return HeightMap{{texels, texels}, range, std::move(heights)};
 }
 
 }  // namespace vcp::meso

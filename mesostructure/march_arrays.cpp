@@ -34,11 +34,12 @@ private:
 };
 
 /// Appends values of any type, low bytes first, and returns the first word's number.
-template <class T>
-uint32_t add(const std::vector<T>& values, std::vector<uint32_t>& words) {
+template <class Values>
+uint32_t add(const Values& values, std::vector<uint32_t>& words) {
     const size_t first = words.size();
-    words.resize(first + (values.size() * sizeof(T) + 3) / 4);
-    if (!values.empty()) std::memcpy(words.data() + first, values.data(), values.size() * sizeof(T));
+    const size_t bytes = values.size() * sizeof(values[0]);
+    words.resize(first + (bytes + 3) / 4);
+    if (bytes > 0) std::memcpy(words.data() + first, values.data(), bytes);
     return uint32_t(first);
 }
 

@@ -13,6 +13,7 @@
 #include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
 
+#include "mesostructure/height_texels.h"
 #include "mesostructure/tile_grid.h"
 #include "octree/io/result.h"
 
@@ -63,8 +64,8 @@ inline constexpr int kMaxMapEdge = 16384;
 /// its height is value / 65535 * range.
 struct HeightMap {
     glm::ivec2 size{0};
-    double range = 0;              ///< height of 65535, tile units; the slab's extent along z
-    std::vector<uint16_t> texels;  ///< row by row, x fastest
+    double range = 0;  ///< height of 65535, tile units; the slab's extent along z
+    HeightTexels texels;
 
     [[nodiscard]] uint16_t texel(int x, int y) const {
         return texels[size_t(wrapped(x, size.x)) + size_t(size.x) * size_t(wrapped(y, size.y))];

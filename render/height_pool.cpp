@@ -13,6 +13,8 @@ using meso::HeightTiles;
 
 constexpr uint64_t kTileBytes = uint64_t{16} * HeightTiles::kQuads;
 // What a read may hold, and what an update takes in.
+// Maps of so many tiles are loaded whole where there is room: up to 2,048 x 2,048 texels.
+constexpr uint32_t kMostLoadedWhole = 350;
 constexpr uint64_t kHeldBytes = uint64_t{64} << 20, kMostTaken = uint64_t{16} << 20;
 
 /// The tiles of a map as pages.
@@ -74,6 +76,7 @@ Result<std::unique_ptr<HeightPool>> HeightPool::create(Device& device,
     for (uint32_t tile = HeightResidency::firstKept(tiles); tile < tiles.count(); ++tile)
         VCP_TRY(made->writeTile(tile, made->residency_.slots()[tile]));
     VCP_TRY(made->writeTable());
+    if (slots == tiles.count() && slots <= kMostLoadedWhole) VCP_TRY(made->loadAll());
     made->loader_ = std::make_unique<PageLoader>(std::make_shared<TileSource>(std::move(heights)),
                                                  LoaderOptions{.withColour = false, .heldBytes = kHeldBytes});
     return made;
@@ -120,6 +123,7 @@ Result<bool> HeightPool::update() {
     if (isChanged) {
         ++version_;
         VCP_TRY(writeTable());
+        tiles_.heights()->letGo();
     }
     loader_->request(residency_.wishes(), kMostTaken);
     return isChanged;

@@ -17,8 +17,8 @@ public:
     /// The pool's bytes for all tiles.
     [[nodiscard]] static uint64_t bytesOfAll(const meso::HeightLevels& heights);
 
-    /// Takes at most `mostBytes` of the device's memory, and loads the coarse levels. Errors: Device; Limit (too few
-    /// bytes for these).
+    /// Takes at most `mostBytes` of the device's memory, and loads the coarse levels, or all of a small map. Errors:
+    /// Device; Limit (too few bytes for the coarse levels).
     static Result<std::unique_ptr<HeightPool>> create(Device& device, std::shared_ptr<const meso::HeightLevels> heights,
                                                       uint64_t mostBytes = UINT64_MAX);
     /// Loads all tiles, and waits for them. Precondition: there is room. Errors: Device.

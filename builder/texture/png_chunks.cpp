@@ -139,12 +139,4 @@ Result<size_t> PngBytes::read(char* to, size_t count) {
     return done;
 }
 
-std::string withoutText(std::string_view file) {
-    const auto bytes = randomBytesAt(file);
-    std::string kept(file.size(), '\0');
-    // Bytes in memory can always be read.
-    kept.resize(*PngBytes(*bytes).read(kept.data(), kept.size()));
-    return kept;
-}
-
 }  // namespace vcp

@@ -51,7 +51,4 @@ private:
     uint64_t bufferAt_ = 0;
 };
 
-/// Returns all bytes that PngBytes has of a file in memory.
-std::string withoutText(std::string_view file);
-
 }  // namespace vcp

@@ -40,6 +40,8 @@ constexpr double kNarrowestPixels = 0.125, kLeastNarrowPixels = 1;
 constexpr double kMostCells = 1 << 23;
 // What is done when the surface is cut, and when all but the kinds of patches is known: parts of the time.
 constexpr double kCuttingPart = 0.7, kKindsPart = 0.8;
+// What was read of a map in a file is let go after so many corners or kinds of patches.
+constexpr size_t kLetGo = 1024;
 constexpr double kNothing = std::numeric_limits<double>::infinity();
 
 float roundedUp(double x) { return std::nextafter(float(x), std::numeric_limits<float>::infinity()); }
@@ -112,6 +114,7 @@ Result<CertifiedCells> CertifiedCells::create(const RemeshSurface& surface,
     made.addEdges(), made.measureCorners();
     if (!told(kKindsPart)) return Error::cancelled();
     made.addKinds();
+    made.patches_.heights->letGo();
     if (!told(1)) return Error::cancelled();
     return made;
 }
@@ -140,9 +143,13 @@ void CertifiedCells::addEdges() {
 void CertifiedCells::measureCorners() {
     for (size_t i = 0; i < patches_.positions.size(); ++i) {
         double most = 0;
-        for (uint32_t k = patches_.firstPlace[i]; k < patches_.firstPlace[i + 1]; ++k)
+        float single = 0;
+        for (uint32_t k = patches_.firstPlace[i]; k < patches_.firstPlace[i + 1]; ++k) {
             most = std::max(most, patches_.heights->height(0, dvec2(patches_.places[k])));
-        heights_.push_back(most);
+            single = std::max(single, patches_.heights->height(0, patches_.places[k]));
+        }
+        heights_.push_back(most), singleHeights_.push_back(single);
+        if (i % kLetGo == 0) patches_.heights->letGo();
     }
 }
 
@@ -498,47 +505,42 @@ void CertifiedCells::refine(size_t patch, std::vector<uint32_t>& open) {
     }
 }
 
-Result<void> CertifiedCells::choose(const RemeshCamera& camera, const RemeshOptions& options, RemeshCounts& counts) {
-    const dvec4 s = camera.picture.value_or(camera.seen);
-    const dvec2 farthest = glm::max(glm::abs(dvec2(s.x, s.y)), glm::abs(dvec2(s.z, s.w)));
-    View view{camera, options.cell, s, std::sqrt(1 + glm::dot(farthest, farthest)), kNarrowestPixels, {}, {}};
-    const auto turned = [&](dvec3 v) {
-        return dvec3(glm::dot(v, camera.right), glm::dot(v, camera.up), glm::dot(v, camera.forward));
-    };
-    const dvec3 from = patches_.origin - camera.eye;
-    for (const glm::vec3& p : patches_.positions) view.positions.push_back(turned(from + dvec3(p)));
-    for (const glm::vec3& d : patches_.directions) view.directions.push_back(turned(dvec3(d)));
-
+bool CertifiedCells::wantSteps(View& view, const RemeshOptions& options) {
     seen_.resize(patches_.triangles.size()), wanted_.resize(seen_.size());
-    const auto wantSteps = [&](size_t first, size_t last) {
+    const auto want = [&](size_t first, size_t last) {
+        if (first % kLetGo == 0) patches_.heights->letGo();
         Scratch scratch;
-        for (size_t kind = first; kind < last; ++kind)
-            for (const uint32_t i : kinds_[kind].patches) {
+        for (size_t number = first; number < last; ++number) {
+            Kind& kind = kinds_[number];
+            if (kind.wantedIn == choice_.number) continue;
+            for (const uint32_t i : kind.patches) {
                 seen_[i] = seenIn(view, i);
-                if (seen_[i].is) wanted_[i] = wantedStep(view, i, seen_[i], options.errorPixels, scratch);
+                if (seen_[i].is) wanted_[i] = wantedStep(view, i, seen_[i], choice_.errorPixels, scratch);
             }
-    };
-    const auto lookedAt = [&] {
-        uint64_t sum = 0;
-        for (const Kind& kind : kinds_) sum += kind.looked;
-        return sum;
-    };
-    const auto cellsWanted = [&] {
-        double sum = 0;
-        for (size_t i = 0; i < seen_.size(); ++i) {
-            const glm::dvec2 a = grids_[i][1] - grids_[i][0], b = grids_[i][2] - grids_[i][0];
-            if (seen_[i].is) sum += 0.5 * std::abs(a.x * b.y - a.y * b.x) * std::exp2(-2 * wanted_[i]);
+            kind.wantedIn = choice_.number;
         }
-        return sum;
     };
-    const uint64_t before = lookedAt();
-    for (;; view.narrowest *= 2) {
+    for (;; choice_.narrowest *= 2, choice_.number = ++choices_) {
+        view.narrowest = choice_.narrowest;
         if (!options.shareOut)
-            wantSteps(0, kinds_.size());
-        else if (!options.shareOut(kinds_.size(), wantSteps))
-            return Error::cancelled();
-        if (view.narrowest >= kLeastNarrowPixels || cellsWanted() <= kMostCells) break;
+            want(0, kinds_.size());
+        else if (!options.shareOut(kinds_.size(), want))
+            return false;
+        if (view.narrowest >= kLeastNarrowPixels || cellsWanted() <= kMostCells) return true;
     }
+}
+
+double CertifiedCells::cellsWanted() const {
+    double sum = 0;
+    for (size_t i = 0; i < seen_.size(); ++i) {
+        const glm::dvec2 a = grids_[i][1] - grids_[i][0], b = grids_[i][2] - grids_[i][0];
+        if (seen_[i].is) sum += 0.5 * std::abs(a.x * b.y - a.y * b.x) * std::exp2(-2 * wanted_[i]);
+    }
+    return sum;
+}
+
+void CertifiedCells::chooseEdges(const View& view) {
+    const double allowed = choice_.errorPixels;
     std::ranges::fill(edgeSteps_, coarsest_);
     std::vector<uint32_t> open;
     Scratch scratch;
@@ -549,20 +551,58 @@ Result<void> CertifiedCells::choose(const RemeshCamera& camera, const RemeshOpti
     }
     // What a patch wants it may have; but its cells are as fine as the finest of its edges, and these as coarse as
     // another patch made them.
-    while (!open.empty()) {
+    for (size_t steps = 0; !open.empty(); ++steps) {
+        if (steps % kLetGo == 0) patches_.heights->letGo();
         const uint32_t patch = open.back();
         open.pop_back();
-        if (!keeps(view, patch, seen_[patch], cells(patch), options.errorPixels, scratch)) refine(patch, open);
+        if (!keeps(view, patch, seen_[patch], cells(patch), allowed, scratch)) refine(patch, open);
     }
     for (uint32_t i = 0; i < seen_.size(); ++i) {
+        if (i % kLetGo == 0) patches_.heights->letGo();
         if (!seen_[i].is) continue;
-        const double error = errorOf(view, i, seen_[i], cells(i), options.errorPixels, scratch);
-        if (error <= options.errorPixels)
-            counts.boundPixels = std::max(counts.boundPixels, error);
+        const double error = errorOf(view, i, seen_[i], cells(i), allowed, scratch);
+        if (error <= allowed)
+            choice_.boundPixels = std::max(choice_.boundPixels, error);
         else
-            ++counts.uncertified;
+            ++choice_.uncertified;
     }
-    counts.looked += lookedAt() - before;
+}
+
+Result<void> CertifiedCells::choose(const RemeshCamera& camera, const RemeshOptions& options, RemeshCounts& counts) {
+    const bool isSame =
+        choice_.camera == camera && choice_.errorPixels == options.errorPixels && choice_.cell == options.cell;
+    if (!isSame || choice_.number == 0)
+        choice_ = {.camera = camera,
+                   .errorPixels = options.errorPixels,
+                   .cell = options.cell,
+                   .narrowest = kNarrowestPixels,
+                   .number = ++choices_};
+    const auto lookedAt = [&] {
+        uint64_t sum = 0;
+        for (const Kind& kind : kinds_) sum += kind.looked;
+        return sum;
+    };
+    if (!choice_.isMade) {
+        const dvec4 s = camera.picture.value_or(camera.seen);
+        const dvec2 farthest = glm::max(glm::abs(dvec2(s.x, s.y)), glm::abs(dvec2(s.z, s.w)));
+        View view{camera, options.cell, s, std::sqrt(1 + glm::dot(farthest, farthest)), kNarrowestPixels, {}, {}};
+        const auto turned = [&](dvec3 v) {
+            return dvec3(glm::dot(v, camera.right), glm::dot(v, camera.up), glm::dot(v, camera.forward));
+        };
+        const dvec3 from = patches_.origin - camera.eye;
+        for (const glm::vec3& p : patches_.positions) view.positions.push_back(turned(from + dvec3(p)));
+        for (const glm::vec3& d : patches_.directions) view.directions.push_back(turned(dvec3(d)));
+        const uint64_t before = lookedAt();
+        if (!wantSteps(view, options)) return Error::cancelled();
+        chooseEdges(view);
+        choice_.isMade = true;
+        if (const uint64_t looked = lookedAt() - before; looked > 0) {
+            counts.looked += looked;
+            patches_.heights->letGo();
+        }
+    }
+    counts.boundPixels = std::max(counts.boundPixels, choice_.boundPixels);
+    counts.uncertified += choice_.uncertified;
     return {};
 }
 

@@ -71,9 +71,18 @@ public:
 
     /// Chooses the cells of a view: errors of at most options.errorPixels on the screen, where the finest cells can,
     /// and beside a jump of the map at most options.cell pixels wide. Fills in boundPixels, looked and uncertified.
-    /// What was measured until options.shareOut cancels stays known. Errors: Cancelled.
+    /// What was measured until options.shareOut cancels stays known, and the next call for the same view goes on there;
+    /// one for the view that was chosen last finds its cells. Errors: Cancelled.
     Result<void> choose(const RemeshCamera& camera, const RemeshOptions& options, RemeshCounts& counts);
 
+    /// The height of a corner of the patches: the most of those that it has in the map, in either precision.
+    template <class Real>
+    [[nodiscard]] Real height(uint32_t corner) const {
+        if constexpr (sizeof(Real) == sizeof(float))
+            return singleHeights_[corner];
+        else
+            return heights_[corner];
+    }
     /// The surface, each triangle a patch.
     [[nodiscard]] const RemeshSurface& patches() const { return patches_; }
     [[nodiscard]] PatchCells cells(size_t patch) const;
@@ -103,8 +112,19 @@ private:
         std::vector<uint32_t> patches;
         std::vector<Known> known;
         uint64_t looked = 0;             ///< texels, ever
+        uint32_t wantedIn = 0;           ///< the last choice in which its patches' steps were wanted
         double lowest = 1, highest = 0;  ///< heights are between these; where lowest is above, not known yet
         bool mayJump = false;            ///< along its edges
+    };
+    /// The view that cells are chosen for, and how far that is.
+    struct Choice {
+        RemeshCamera camera;
+        double errorPixels = 0, cell = 0;
+        double narrowest = 0;  ///< as in View
+        uint32_t number = 0;   ///< of the steps that are wanted: Kind::wantedIn
+        bool isMade = false;
+        double boundPixels = 0;  ///< as in RemeshCounts, and the next
+        uint64_t uncertified = 0;
     };
     /// What a view makes of errors: pixels are (perHeight height + perUnit across) / (depth - nearer |error|).
     struct Seen {
@@ -147,6 +167,11 @@ private:
     bool keeps(const View& view, size_t patch, const Seen& seen, const PatchCells& cells, double allowed,
                Scratch& scratch);
     void refine(size_t patch, std::vector<uint32_t>& open);
+    /// Finds the steps that patches want. Returns false where it was cancelled.
+    bool wantSteps(View& view, const RemeshOptions& options);
+    [[nodiscard]] double cellsWanted() const;
+    /// Chooses steps of edges that keep what patches may leave out, and finds what is certified then.
+    void chooseEdges(const View& view);
 
     RemeshSurface patches_;
     int finest_ = 0;                                   ///< the finest cells are 1 / 2^finest texels wide
@@ -157,10 +182,13 @@ private:
     std::vector<int> edgeParts_, edgeSteps_;           ///< of each edge, parts among the finest cells
     std::vector<bool> isJump_;                         ///< of each edge, whether a patch beside it may jump
     std::vector<double> heights_;                      ///< of the corners
+    std::vector<float> singleHeights_;
     std::vector<Kind> kinds_;
     std::vector<uint32_t> kindOf_;  ///< of each patch
     std::vector<Seen> seen_;
     std::vector<int> wanted_;  ///< steps, of each patch that is seen
+    Choice choice_;
+    uint32_t choices_ = 0;
 };
 
 /// Adds the surface's triangles with cells of the map to a mesh. Errors: as remesh().

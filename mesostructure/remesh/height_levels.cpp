@@ -10,19 +10,19 @@ namespace vcp::meso {
 namespace {
 
 HeightLevel sampledLevel(const HeightLevel& map, glm::ivec2 size) {
-    HeightLevel made{size, {}};
+    std::vector<uint16_t> heights;
     for (int j = 0; j < size.y; ++j)
         for (int i = 0; i < size.x; ++i) {
             const int64_t x = int64_t{i} * map.size.x / size.x, y = int64_t{j} * map.size.y / size.y;
-            made.texels.push_back(map.texels[size_t(x + map.size.x * y)]);
+            heights.push_back(map.texels[size_t(x + map.size.x * y)]);
         }
-    return made;
+    return {size, std::move(heights)};
 }
 
-HeightLevel levelOf(const std::vector<HeightLevel>& below, glm::ivec2 size, const LevelFitOptions& options,
-                    LevelVolume& volume) {
+Result<HeightLevel> levelOf(const std::vector<HeightLevel>& below, glm::ivec2 size, const LevelFitOptions& options,
+                            LevelVolume& volume) {
     if (options.fit == LevelFit::Sampled) return sampledLevel(below.front(), size);
-    if (options.fit == LevelFit::Averaged) return averagedLevel(below.back(), size);
+    if (options.fit == LevelFit::Averaged) return averagedLevel(below.back(), size, options.store);
     return fitLevel(below.front(), size, options, volume);
 }
 
@@ -42,13 +42,19 @@ Result<HeightLevels> HeightLevels::build(HeightMap map, const LevelFitOptions& o
         const glm::ivec2 below = made.levels_.back().size, size(std::max(below.x / 2, 1), std::max(below.y / 2, 1));
         LevelVolume volume;
         const bool isUsed = int(made.levels_.size()) < options.mostLevels;
-        HeightLevel level =
-            isUsed ? levelOf(made.levels_, size, options, volume) : averagedLevel(made.levels_.back(), size);
-        made.levels_.push_back(std::move(level));
+        auto level = isUsed ? levelOf(made.levels_, size, options, volume)
+                            : averagedLevel(made.levels_.back(), size, options.store);
+        if (!level) return level.error();
+        made.levels_.push_back(*std::move(level));
         if (isUsed) made.used_ = int(made.levels_.size());
         made.volumes_.push_back(volume);
     }
+    made.letGo();
     return made;
+}
+
+void HeightLevels::letGo() const {
+    for (const HeightLevel& level : levels_) level.texels.letGo();
 }
 
 uint64_t HeightLevels::bytes() const {

@@ -26,7 +26,7 @@ enum class LevelFit {
 
 struct HeightLevel {
     glm::ivec2 size{0};
-    std::vector<uint16_t> texels;  ///< row by row, x fastest; 65535 is 1
+    HeightTexels texels;  ///< 65535 is 1
 
     [[nodiscard]] double at(int x, int y) const {
         return texels[size_t(wrapped(x, size.x)) + size_t(size.x) * size_t(wrapped(y, size.y))] * (1 / 65535.0);
@@ -49,12 +49,13 @@ struct LevelFitOptions {
     /// Levels that heights are taken from, with the map. 1 is for atlases: coarser levels mix charts that have nothing
     /// to do with each other. Those beyond are averages, and stand in for what a device has not got yet.
     int mostLevels = 32;
+    HeightStore store = {};  ///< of the coarser levels
 };
 
 class HeightLevels {
 public:
     /// The map's texels become level 0. Errors: InvalidInput (a map without texels, of another size than it says, or
-    /// without a range).
+    /// without a range); Io (levels in a file).
     static Result<HeightLevels> build(HeightMap map, const LevelFitOptions& options = {});
 
     [[nodiscard]] const std::vector<HeightLevel>& levels() const { return levels_; }
@@ -64,6 +65,8 @@ public:
     /// Texels of the map a tile unit, along x and y.
     [[nodiscard]] glm::dvec2 texels() const { return {levels_.front().size.x, levels_.front().size.y / rows_}; }
     [[nodiscard]] uint64_t bytes() const;
+    /// Takes what was read of levels in files out of main memory.
+    void letGo() const;
 
     /// Returns the height of a level at a place in tile units, bilinear.
     template <class Real>
@@ -81,10 +84,12 @@ private:
 };
 
 /// Returns the means of a level around the corners of a coarser one, by the weights with which they count there.
-HeightLevel averagedLevel(const HeightLevel& from, glm::ivec2 size);
+/// Errors: Io.
+Result<HeightLevel> averagedLevel(const HeightLevel& from, glm::ivec2 size, const HeightStore& store = {});
 
-/// Fits one level of a map's level 0: LevelFit::Printed or Least. `volume` gets what was done.
-HeightLevel fitLevel(const HeightLevel& map, glm::ivec2 size, const LevelFitOptions& options, LevelVolume& volume);
+/// Fits one level of a map's level 0: LevelFit::Printed or Least. `volume` gets what was done. Errors: Io.
+Result<HeightLevel> fitLevel(const HeightLevel& map, glm::ivec2 size, const LevelFitOptions& options,
+                             LevelVolume& volume);
 
 /// Returns the mean distance between a level and the map, at the map's texels.
 double levelVolume(const HeightLevel& map, const HeightLevel& level);

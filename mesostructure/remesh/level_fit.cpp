@@ -206,9 +206,11 @@ double levelVolume(const HeightLevel& map, const HeightLevel& level) {
     return volumeOf(Interpolation(map.size, level.size), FloatMap(map), FloatMap(level).heights);
 }
 
-HeightLevel averagedLevel(const HeightLevel& from, glm::ivec2 size) {
+Result<HeightLevel> averagedLevel(const HeightLevel& from, glm::ivec2 size, const HeightStore& store) {
+    constexpr int kLetGo = 64;  // rows
     const Tents x(from.size.x, size.x), y(from.size.y, size.y);
-    HeightLevel made{size, std::vector<uint16_t>(size_t(size.x) * size_t(size.y))};
+    VCP_TRY_ASSIGN(auto rows, HeightRows::create(size, store));
+    std::vector<uint16_t> made(size_t(size.x));
     Heights column(size_t(from.size.x));
     for (int j = 0; j < size.y; ++j) {
         std::ranges::fill(column, 0.0f);
@@ -219,17 +221,20 @@ HeightLevel averagedLevel(const HeightLevel& from, glm::ivec2 size) {
         for (int i = 0; i < size.x; ++i) {
             float sum = 0;
             for (const Tents::Share& share : x.of(i)) sum += share.weight * column[size_t(share.texel)];
-            made.texels[size_t(i) + size_t(size.x) * size_t(j)] = uint16_t(std::min(sum + 0.5f, 65535.0f));
+            made[size_t(i)] = uint16_t(std::min(sum + 0.5f, 65535.0f));
         }
+        VCP_TRY(rows.write(j, made));
+        if (j % kLetGo == 0) from.texels.letGo();
     }
-    return made;
+    return HeightLevel{size, std::move(rows).take()};
 }
 
-HeightLevel fitLevel(const HeightLevel& map, glm::ivec2 size, const LevelFitOptions& options, LevelVolume& volume) {
+Result<HeightLevel> fitLevel(const HeightLevel& map, glm::ivec2 size, const LevelFitOptions& options,
+                             LevelVolume& volume) {
     const Interpolation places(map.size, size);
     const FloatMap heights(map);
-    HeightLevel level = averagedLevel(map, size);
-    Heights fitted = FloatMap(level).heights;
+    VCP_TRY_ASSIGN(const auto averaged, averagedLevel(map, size));
+    Heights fitted = FloatMap(averaged).heights;
     volume = {.averaged = volumeOf(places, heights, fitted)};
     if (options.fit == LevelFit::Printed) {
         volume.iterations = fitAsPrinted(places, heights, options.mostIterations, fitted);
@@ -244,9 +249,10 @@ HeightLevel fitLevel(const HeightLevel& map, glm::ivec2 size, const LevelFitOpti
     }
     volume.fitted = volumeOf(places, heights, fitted);
     // The range's ends are multiples of the step, so that nothing overshoots for being rounded.
-    std::ranges::transform(fitted, level.texels.begin(),
+    std::vector<uint16_t> rounded(fitted.size());
+    std::ranges::transform(fitted, rounded.begin(),
                            [](float height) { return uint16_t(std::lround(65535 * std::clamp(height, 0.0f, 1.0f))); });
-    return level;
+    return HeightLevel{size, std::move(rounded)};
 }
 
 }  // namespace vcp::meso

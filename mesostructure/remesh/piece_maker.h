@@ -128,7 +128,8 @@ private:
         if (isMeasured_[number]) return;
         isMeasured_[number] = true;
         Corner& corner = corners_[number];
-        corner.height = 0;
+        corner.height = cells_ != nullptr ? cells_->template height<Real>(number) : Real(0);
+        if (cells_ != nullptr) return;
         for (uint32_t i = surface_.firstPlace[number]; i < surface_.firstPlace[number + 1]; ++i)
             corner.height = std::max(
                 corner.height, heightAt(Real2(surface_.places[i]), corner.position, corner.direction, corner.density));

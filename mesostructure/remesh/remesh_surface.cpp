@@ -198,8 +198,9 @@ private:
                          .message = fmt::format("a remeshed surface of more than {} patches of {} texels",
                                                 options_.mostTriangles, options_.mostTexels)};
         const double done = area_ > 0 ? std::min(areaDone_ / area_, 1.0) : 0;
-        if (steps_++ % kTold == 0 && options_.progress && !options_.progress(done)) return Error::cancelled();
-        return {};
+        if (steps_++ % kTold != 0) return {};
+        cut_.heights->letGo();
+        return options_.progress && !options_.progress(done) ? Result<void>(Error::cancelled()) : Result<void>();
     }
 
     /// Halves the longest edge, and with it one that is nearly as long: the two middles are joined, so that what is

@@ -33,6 +33,8 @@ struct RemeshCamera {
     glm::dvec4 seen{-1, -1, 1, 1};
     double nearest = 1e-3;              ///< world units; nearer than this nothing is seen. Not used for parallel rays.
     std::optional<glm::dvec4> picture;  ///< what all of a picture sees of which this is a tile: its cells are chosen
+
+    bool operator==(const RemeshCamera&) const = default;
 };
 
 enum class HeightAccess {

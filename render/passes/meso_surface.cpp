@@ -22,6 +22,7 @@ constexpr VkBufferUsageFlags kConstantsUse = VK_BUFFER_USAGE_UNIFORM_BUFFER_BIT 
 PictureSize sizeOf(const FrameRequest& request) { return {request.width, request.height}; }
 
 // What a pipeline casts (kRays of shaders/meso_surface.comp).
+constexpr uint32_t kConstantOfAllTiles = 10;  // kAllTiles of shaders/remesh_merge.comp
 constexpr uint32_t kPictureRays = 0, kRaysToLights = 1, kRayToLight = 2, kRayIntoSky = 3;
 
 VkBuffer handleOf(const Buffer* buffer) { return buffer != nullptr ? buffer->handle() : VK_NULL_HANDLE; }
@@ -170,7 +171,7 @@ Result<void> MesoSurfacePass::choosePipelines(const Placed& surface, MesoTarget:
                                               const Shading& shading, bool inScene) {
     const std::vector<uint32_t> march =
         surface.arrays ? wordsOf(surface.arrays->constants) : wordsOf(meso::MarchConstants());
-    const auto choose = [&](std::span<const uint32_t> spirv, uint32_t rays, uint32_t textures) {
+    const auto constantsFor = [&](uint32_t rays, uint32_t textures) {
         std::vector<uint32_t> constants = march;
         constants.insert(constants.end(), {rays, textures, surface.isFarDrawn ? 1u : 0u, inScene ? 1u : 0u});
         // Without the plane the pipelines are those of pictures without transfer.
@@ -181,10 +182,16 @@ Result<void> MesoSurfacePass::choosePipelines(const Placed& surface, MesoTarget:
             if (!withTransfer) constants.push_back(0);
             constants.push_back(starts);
         }
-        return resources_.pipeline(spirv, constants);
+        return constants;
+    };
+    const auto choose = [&](std::span<const uint32_t> spirv, uint32_t rays, uint32_t textures) {
+        return resources_.pipeline(spirv, constantsFor(rays, textures));
     };
     if (surface.remeshed.surface) {
-        VCP_TRY_ASSIGN(drawing.cast, choose(kRemeshMergeSpirv, kPictureRays, surface.textures));
+        std::vector<uint32_t> constants = constantsFor(kPictureRays, surface.textures);
+        constants.resize(kConstantOfAllTiles);
+        constants.push_back(surface.heights->hasAll() ? 1 : 0);
+        VCP_TRY_ASSIGN(drawing.cast, resources_.pipeline(kRemeshMergeSpirv, constants));
     } else {
         VCP_TRY_ASSIGN(drawing.cast, choose(kMesoSurfaceSpirv, kPictureRays, surface.textures));
     }

@@ -40,7 +40,7 @@ RemeshSweepPass::~RemeshSweepPass() {
 }
 
 Result<void> RemeshSweepPass::createPipelines() {
-    if (emit_.handle() != VK_NULL_HANDLE) return {};
+    if (emitOfAll_.handle() != VK_NULL_HANDLE) return {};
     std::vector<VkDescriptorSetLayoutBinding> bindings;
     for (uint32_t i = 0; i < kBindingCount; ++i)
         bindings.push_back({i, kBindings[i], 1, VK_SHADER_STAGE_COMPUTE_BIT, nullptr});
@@ -58,6 +58,8 @@ Result<void> RemeshSweepPass::createPipelines() {
     VCP_TRY_ASSIGN(count_, ComputePipeline::create(device_, layout_, kRemeshCountSpirv, {}));
     VCP_TRY_ASSIGN(scan_, ComputePipeline::create(device_, layout_, kRemeshScanSpirv, {}));
     VCP_TRY_ASSIGN(emit_, ComputePipeline::create(device_, layout_, kRemeshEmitSpirv, {}));
+    const uint32_t allTiles = 1;
+    VCP_TRY_ASSIGN(emitOfAll_, ComputePipeline::create(device_, layout_, kRemeshEmitSpirv, {&allTiles, 1}));
     return {};
 }
 
@@ -139,7 +141,7 @@ Result<void> RemeshSweepPass::prepare(std::vector<RemeshSwept>& swept, const mes
             VCP_TRY_ASSIGN(made.set, allocateSet(device_.handle(), setLayout_, kPoolSizes));
         }
         writeSet(made, heights);
-        made.pieces = batch.pieces(), made.columns = batch.columns();
+        made.pieces = batch.pieces(), made.columns = batch.columns(), made.hasAllTiles = heights.hasAll();
     }
     return {};
 }
@@ -168,7 +170,9 @@ void RemeshSweepPass::record(VkCommandBuffer commands, const std::vector<RemeshS
     barrierComputeToCompute(commands);
     forEach([&](const RemeshSwept& batch) { dispatch(scan_, batch, 1); });
     barrierComputeToCompute(commands);
-    forEach([&](const RemeshSwept& batch) { dispatch(emit_, batch, groups(batch.columns, kEmitted)); });
+    forEach([&](const RemeshSwept& batch) {
+        dispatch(batch.hasAllTiles ? emitOfAll_ : emit_, batch, groups(batch.columns, kEmitted));
+    });
     barrierComputeToDraw(commands);
 }
 

@@ -25,6 +25,7 @@ struct RemeshSwept {
     Buffer counts, drawn, vertices, indices;
     MesoSet set;
     uint32_t pieces = 0, columns = 0;
+    bool hasAllTiles = false;  ///< of its heights
 };
 
 class RemeshSweepPass {
@@ -52,7 +53,7 @@ private:
     Device& device_;
     VkDescriptorSetLayout setLayout_ = VK_NULL_HANDLE;
     VkPipelineLayout layout_ = VK_NULL_HANDLE;
-    ComputePipeline count_, scan_, emit_;
+    ComputePipeline count_, scan_, emit_, emitOfAll_;  // the last: where all tiles are there
 };
 
 /// Records the draws of what was swept, within a render pass.

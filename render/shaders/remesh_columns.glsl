@@ -16,6 +16,8 @@ layout(set = 0, binding = 5, std430) buffer VertexBlock { uvec2 vertices[]; };
 layout(set = 0, binding = 6, std430) buffer IndexBlock { uint indices[]; };
 layout(set = 0, binding = 7, std430) buffer HeightMarkBlock { uint heightMarks[]; };  // as in meso_bindings.glsl
 
+layout(constant_id = 0) const uint kAllTiles = 0u;
+
 const uint kCounted = 256u;  // columns of a workgroup of remesh_count.comp
 
 uint nextIndex;  // of the invocation's triangles

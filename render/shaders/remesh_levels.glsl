@@ -1,6 +1,7 @@
 // The levels of heights, which are in tiles (mesostructure/shared/remesh_layout.h). Whoever includes this has
 //   uvec4 fetchHeightQuad(int i)     the i-th quad of the levels
 //   void markHeightTile(int entry)   says that the picture reads the tile of an entry
+//   const uint kAllTiles             1: all tiles are there, and none is marked
 struct RemeshLevel {
     ivec2 size;
     vec2 texels;
@@ -29,6 +30,7 @@ int remeshWrapped(float x, int n);
 
 // No branch: software devices go through both sides of one.
 RemeshLevel remeshThere(RemeshLevel level, vec2 at) {
+    if (kAllTiles != 0u) return level;
     vec2 texel = floor(at * level.texels);
     int entry = entryOf(level, ivec2(remeshWrapped(texel.x, level.size.x), remeshWrapped(texel.y, level.size.y)));
     markHeightTile(entry);

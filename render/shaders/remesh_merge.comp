@@ -7,6 +7,7 @@ layout(constant_id = 5) const uint kTextures = 0u;  // kMesoColours
 layout(constant_id = 7) const uint kScene = 0u;     // 1: surfaces and datasets shade each other
 layout(constant_id = 8) const uint kTransfer = 0u;
 layout(constant_id = 9) const uint kStarts = 0u;
+layout(constant_id = 10) const uint kAllTiles = 0u;
 layout(local_size_x = 8, local_size_y = 8) in;
 
 uint fetchHit(uint i) { return hits[i]; }

@@ -14,10 +14,10 @@ HeightMap flat(uint16_t value) { return {{8, 8}, 0.25, std::vector<uint16_t>(64,
 
 /// Walls along y, of 45 degrees on both sides: a triangle wave.
 HeightMap roof() {
-    HeightMap map{{8, 8}, 0.5, {}};
+    std::vector<uint16_t> heights;
     for (int y = 0; y < 8; ++y)
-        for (int x = 0; x < 8; ++x) map.texels.push_back(uint16_t(65535 * (x < 4 ? x : 8 - x) / 4));
-    return map;
+        for (int x = 0; x < 8; ++x) heights.push_back(uint16_t(65535 * (x < 4 ? x : 8 - x) / 4));
+    return {{8, 8}, 0.5, std::move(heights)};
 }
 
 TEST(Appearance, OfAPlaneIsAPlanes) {

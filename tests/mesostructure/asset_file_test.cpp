@@ -70,8 +70,8 @@ TEST(AssetFile, GivesBackWhatWasWritten) {
         EXPECT_EQ(read->patches->normals.size(), read->patches->patches.size());
         EXPECT_EQ(read->triangles, asset.triangles);
         EXPECT_EQ(read->compressed->bytes(), asset.compressed->bytes());
-        EXPECT_EQ(read->heights ? read->heights->texels : std::vector<uint16_t>(),
-                  asset.heights ? asset.heights->texels : std::vector<uint16_t>());
+        EXPECT_EQ(read->heights ? read->heights->texels : HeightTexels(),
+                  asset.heights ? asset.heights->texels : HeightTexels());
         // The same again, byte for byte.
         ASSERT_TRUE(writeAsset(folder / "b.meso", *read).ok());
         EXPECT_EQ(contentOf(folder / "a.meso"), contentOf(folder / "b.meso"));
@@ -324,6 +324,43 @@ TEST(AssetFile, LiesOfMapsAreRefusedOrHarmless) {
     }
 }
 
+/// Large heights stay in a file: of the same bytes, and hostile ones are refused alike.
+TEST(AssetFile, HeightsThatStayInAFileAreTheSame) {
+    const TestFolder folder("meso_asset_file_test");
+    Asset asset;
+    asset.name = "large";
+    asset.heights = *makeHeightField("fbm", 64, 5);
+    asset.extent = asset.heights->extent();
+    ASSERT_TRUE(writeAsset(folder / "a.meso", asset).ok());
+    const HeightStore inFiles{.folder = folder.path(), .mostInMemory = 100};
+    const auto read = readAsset(folder / "a.meso", inFiles);
+    ASSERT_TRUE(read.ok()) << read.error().line();
+    EXPECT_TRUE(read->heights->texels.areInFile());
+    EXPECT_FALSE(readAsset(folder / "a.meso")->heights->texels.areInFile());
+    ASSERT_TRUE(writeAsset(folder / "b.meso", *read).ok());
+    EXPECT_EQ(contentOf(folder / "a.meso"), contentOf(folder / "b.meso"));
+    const Bytes whole = bytesOf(folder / "a.meso");
+    std::filesystem::resize_file(folder / "a.meso", 0);
+    read->heights->texels.letGo();
+    EXPECT_EQ(read->heights->texels, asset.heights->texels) << "what became of the file does not matter";
+    const auto put = [&](const Bytes& bytes) {
+        std::ofstream(folder / "x.meso", std::ios::binary)
+            .write(reinterpret_cast<const char*>(bytes.data()), std::streamsize(bytes.size()));
+        return readAsset(folder / "x.meso", inFiles);
+    };
+    for (size_t i = 0; i < whole.size(); i += 97) {
+        Bytes changed = whole;
+        changed[i] ^= std::byte{4};
+        const auto inFile = put(changed), inMemory = parseAsset(changed, (folder / "x.meso").string());
+        ASSERT_EQ(inFile.ok(), inMemory.ok()) << i;
+        if (!inFile.ok()) {
+            EXPECT_EQ(inFile.error().line(), inMemory.error().line());
+        }
+    }
+    for (const size_t kept : {size_t{300}, size_t{400}, whole.size() / 2, whole.size() - 1})
+        EXPECT_FALSE(put(Bytes(whole.begin(), whole.begin() + std::ptrdiff_t(kept))).ok()) << kept;
+}
+
 TEST(AssetFile, OtherFilesAreToldApart) {
     const TestFolder folder("meso_asset_other_test");
     const auto says = [&](const std::string& text) {
@@ -350,7 +387,7 @@ TEST(AssetFile, BuildingRefusesWhatDoesNotFit) {
     asset.heights = *makeHeightField("fbm", 30, 1);
     EXPECT_EQ(buildAsset(asset, {.cells = {16, 16, 4}}).error().code, ErrorCode::Usage);
     EXPECT_TRUE(buildAsset(asset, {}).ok()) << "a grid that divides the texels is found";
-    asset.heights->texels.clear();
+    asset.heights->texels = {};
     EXPECT_FALSE(buildAsset(asset, {}).ok());
     Asset unknown;
     unknown.solid = "nothing";

@@ -247,9 +247,10 @@ TEST(TileReflection, IsThatOfPlanesAndGrooves) {
     const TileReflection ofPlane = tileReflection(TilePaths(*shape, 0.6));
     EXPECT_NEAR(ofPlane.height, 0.15, 1e-9);
     EXPECT_NEAR(ofPlane.albedo, 0.6, 0.02);
-    HeightMap grooved{{8, 8}, 0.5, {}};
+    std::vector<uint16_t> heights;
     for (int y = 0; y < 8; ++y)
-        for (int x = 0; x < 8; ++x) grooved.texels.push_back(uint16_t(65535 * (x < 4 ? x : 8 - x) / 4));
+        for (int x = 0; x < 8; ++x) heights.push_back(uint16_t(65535 * (x < 4 ? x : 8 - x) / 4));
+    const HeightMap grooved{{8, 8}, 0.5, std::move(heights)};
     const auto grooves = test::heights(grooved);
     for (const double albedo : {0.3, 0.8, 1.0}) {
         // What is not given back is what the walls keep, whose area is the root of 2.

@@ -28,10 +28,10 @@ HeightMap flat(uint16_t value) { return {{8, 8}, 0.25, std::vector<uint16_t>(64,
 
 /// Grooves along y whose walls rise by 45 degrees.
 HeightMap grooves() {
-    HeightMap map{{8, 8}, 0.5, {}};
+    std::vector<uint16_t> heights;
     for (int y = 0; y < 8; ++y)
-        for (int x = 0; x < 8; ++x) map.texels.push_back(uint16_t(65535 * (x < 4 ? x : 8 - x) / 4));
-    return map;
+        for (int x = 0; x < 8; ++x) heights.push_back(uint16_t(65535 * (x < 4 ? x : 8 - x) / 4));
+    return {{8, 8}, 0.5, std::move(heights)};
 }
 
 dvec3 anyDirection(std::mt19937& random) {

@@ -145,7 +145,8 @@ TEST_F(MesoMarch, RaysOfFarTilesHitWhereTheTruthSays) {
     Asset asset;
     asset.heights = *makeHeightField("fbm", 48, 3);
     asset.heights->size.y = 16;
-    asset.heights->texels.resize(48 * 16);
+    const auto& heights = asset.heights->texels;
+    asset.heights->texels = std::vector<uint16_t>(heights.begin(), heights.begin() + 48 * 16);
     const auto shape = test::heights(*asset.heights);
     std::mt19937 random(1);
     std::vector<MarchRay> rays;

@@ -12,14 +12,16 @@ namespace vcp {
 /// alpha is left out; 8 bits become 16 by v * 257, and white is `range` high, tile units. Or an EXR
 /// (viewer/asset/exr_picture.h): heightsOf its values. The picture's upper row is the tile's highest y. The bytes may
 /// be hostile. Errors, without file: InvalidInput (damaged, truncated, another format), Limit (more than kMaxMapEdge
-/// texels), Unsupported (kinds of EXR).
-Result<meso::HeightMap> decodeHeights(std::span<const std::byte> file, double range);
+/// texels), Unsupported (kinds of EXR), Io (many heights, which are in a file of the store).
+Result<meso::HeightMap> decodeHeights(std::span<const std::byte> file, double range,
+                                      const meso::HeightStore& store = {});
 
 /// Does decodeHeights() of a file of at most 512 MiB. Errors: Io, and those, all with the file's name.
-Result<meso::HeightMap> readHeightImage(const std::filesystem::path& path, double range);
+Result<meso::HeightMap> readHeightImage(const std::filesystem::path& path, double range,
+                                        const meso::HeightStore& store = {});
 
 /// Makes heights of values of any size: the least lies on the slab's bottom, the greatest `range` above it, in steps of
-/// 1/65535; where all are the same, all lie on the bottom.
-meso::HeightMap heightsOf(const FloatPicture& picture, double range);
+/// 1/65535; where all are the same, all lie on the bottom. Errors: Io.
+Result<meso::HeightMap> heightsOf(const FloatPicture& picture, double range, const meso::HeightStore& store = {});
 
 }  // namespace vcp

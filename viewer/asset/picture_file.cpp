@@ -7,12 +7,6 @@
 
 namespace vcp {
 
-namespace {
-
-constexpr size_t kMostFileBytes = size_t{1} << 29;
-
-}  // namespace
-
 Result<std::vector<std::byte>> readPictureFile(const std::filesystem::path& path) {
     VCP_TRY_ASSIGN(const auto file, openRegularStream(path));
     std::vector<std::byte> bytes;
@@ -22,7 +16,8 @@ Result<std::vector<std::byte>> readPictureFile(const std::filesystem::path& path
         const size_t got = std::fread(bytes.data() + had, 1, bytes.size() - had, file.get());
         bytes.resize(had + got);
         if (std::ferror(file.get())) return Error{.code = ErrorCode::Io, .message = "cannot be read"};
-        if (bytes.size() > kMostFileBytes) return Error{.code = ErrorCode::Limit, .message = "is larger than 512 MiB"};
+        if (bytes.size() > kMostPictureBytes)
+            return Error{.code = ErrorCode::Limit, .message = "is larger than 512 MiB"};
         if (got == 0) return bytes;
     }
 }

@@ -11,6 +11,8 @@
 
 namespace vcp {
 
+inline constexpr size_t kMostPictureBytes = size_t{1} << 29;
+
 /// Reads a file, or a pipe, of at most 512 MiB. Errors, without file: Io, Limit.
 Result<std::vector<std::byte>> readPictureFile(const std::filesystem::path& path);
 

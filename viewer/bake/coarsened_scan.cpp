@@ -72,7 +72,21 @@ uint64_t borderEdges(const BaseSurface& surface) {
     return uint64_t(std::ranges::count(opposite, meso::kNoEdge));
 }
 
-/// Leaves about so many triangles, and the corners that these have. Corners on borders stay.
+/// Leaves out corners that no triangle has.
+void keepUsedCorners(BaseSurface& surface) {
+    constexpr uint32_t kUnused = UINT32_MAX;
+    std::vector<uint32_t> renumbered(surface.positions.size(), kUnused);
+    std::vector<glm::dvec3> kept;
+    for (auto& t : surface.triangles)
+        for (uint32_t& corner : t) {
+            uint32_t& number = renumbered[corner];
+            if (number == kUnused) number = uint32_t(kept.size()), kept.push_back(surface.positions[corner]);
+            corner = number;
+        }
+    surface.positions = std::move(kept);
+}
+
+/// Leaves about so many triangles. Corners on borders stay.
 void simplify(BaseSurface& surface, size_t triangles) {
     std::vector<glm::vec3> places;  // single precision is relative to the lowest corner
     const Box box = Box::of(surface.positions);
@@ -82,16 +96,7 @@ void simplify(BaseSurface& surface, size_t triangles) {
                                             places.size(), sizeof places[0], 3 * std::min(triangles, left.size()), 1,
                                             meshopt_SimplifyLockBorder, nullptr);
     left.resize(indices / 3);
-    constexpr uint32_t kUnused = UINT32_MAX;
-    std::vector<uint32_t> renumbered(surface.positions.size(), kUnused);
-    std::vector<glm::dvec3> kept;
-    for (auto& t : left)
-        for (uint32_t& corner : t) {
-            uint32_t& number = renumbered[corner];
-            if (number == kUnused) number = uint32_t(kept.size()), kept.push_back(surface.positions[corner]);
-            corner = number;
-        }
-    surface.positions = std::move(kept), surface.triangles = std::move(left);
+    surface.triangles = std::move(left);
 }
 
 class Coarsening {
@@ -121,6 +126,7 @@ public:
         BaseSurface whole;
         for (Run& run : runs_) append(whole, run.surface), run.surface = {};
         made_.vertices -= join(whole);
+        if (runs_.size() > 1) partSheets(whole);
         for (const double most : away_) made_.away += most;
         made_.mesh = {std::move(whole.positions), std::move(whole.triangles), {}};
         return std::move(made_);
@@ -155,8 +161,9 @@ private:
     /// Simplifies a run in a thread of its own. `round`: how many times it was simplified before.
     Result<void> start(Run run, size_t round) {
         VCP_TRY(finish(threads_ - 1));
-        working_.push_back({round, std::async(std::launch::async, [this, run = std::move(run)]() mutable {
-                                return caught([&]() -> Result<SimplifiedRun> { return simplified(std::move(run)); });
+        working_.push_back({round, std::async(std::launch::async, [this, round, run = std::move(run)]() mutable {
+                                return caught(
+                                    [&]() -> Result<SimplifiedRun> { return simplified(std::move(run), round); });
                             })});
         return {};
     }
@@ -209,10 +216,12 @@ private:
     }
 
     /// Any thread.
-    [[nodiscard]] SimplifiedRun simplified(Run run) const {
+    [[nodiscard]] SimplifiedRun simplified(Run run, size_t round) const {
         SimplifiedRun made;
         made.joined = join(run.surface);
         made.vertices = run.surface.positions.size();
+        // Where two runs are pinched at one place of their border, their sheets touch.
+        if (round > 0) partSheets(run.surface);
         made.leftOut = keepManifoldPart(run.surface);
         made.run.scanTriangles = run.scanTriangles;
         if (run.surface.triangles.empty() || isStopped_) return made;
@@ -220,8 +229,9 @@ private:
         const double part = double(run.scanTriangles) / double(all_), share = part * double(options_.triangles);
         made.run.surface = run.surface;
         simplify(made.run.surface, size_t(share) + borderEdges(run.surface));
-        leaveOutFolds(made.run.surface);
+        leaveOutFolds(made.run.surface), partSheets(made.run.surface);
         made.leftOut += keepManifoldPart(made.run.surface);
+        keepUsedCorners(made.run.surface);
         if (made.run.surface.triangles.empty() || isStopped_) return made;
         const IndexedMesh scan{std::move(run.surface.positions), std::move(run.surface.triangles), {}},
             coarse{made.run.surface.positions, made.run.surface.triangles, {}};

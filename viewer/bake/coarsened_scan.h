@@ -4,9 +4,10 @@
 // meshoptimizer: edges collapse by quadric errors, but corners on its border stay, so that runs meet edge by edge.
 // Where the borders are too many, neighbouring runs are joined and simplified again, now over the borders between them.
 //
-// The simplifier does not ask whether the surface stays a manifold. What lies back to back is left out, which keeps
-// closed what was; of edges that still have more than two triangles some are left out, and that leaves small holes. It
-// takes a thirtieth of the time of meso::decimated, which does ask, and by which the base is made of what is left.
+// The simplifier does not ask whether the surface stays a manifold. What lies back to back is left out, and
+// sheets that touch are parted (mesostructure/base/manifold_part.h), which keeps closed what was; where borders of runs
+// are pinched, triangles are left out. It takes a thirtieth of the time of meso::decimated, which does ask, and by
+// which the base is made of what is left.
 //
 // Runs are simplified on all threads. What comes out depends on the memory, and by that on the number of threads.
 #pragma once

@@ -18,6 +18,7 @@
 #include "viewer/command/parsed_option.h"
 #include "viewer/command/terminal/interrupt.h"
 #include "viewer/command/terminal/progress_display.h"
+#include "viewer/scene/meso_scene.h"
 #include "viewer/scene/option_values.h"
 
 namespace vcp {
@@ -138,7 +139,7 @@ Result<void> readSource(const BuildMeso& c, Asset& asset) {
     if (isIn(heightFieldNames()) || extension == ".png" || extension == ".exr") {
         VCP_TRY_ASSIGN(asset.heights, isIn(heightFieldNames())
                                           ? makeHeightField(c.source, c.texels, c.seed)
-                                          : readHeightImage(c.source, c.height > 0 ? c.height : 0.1));
+                                          : readHeightImage(c.source, c.height > 0 ? c.height : 0.1, heightStore()));
         if (c.height > 0) asset.heights->range = c.height;
         return {};
     }
@@ -301,7 +302,7 @@ Result<int> runBuild(const BuildMeso& command) {
 }
 
 Result<int> runInfo(const InfoMeso& command) {
-    VCP_TRY_ASSIGN(const auto asset, readAsset(command.file));
+    VCP_TRY_ASSIGN(const auto asset, readAsset(command.file, heightStore()));
     std::error_code ignored;
     const uint64_t bytes = std::filesystem::file_size(command.file, ignored);
     if (command.report.json)

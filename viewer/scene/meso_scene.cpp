@@ -50,7 +50,7 @@ Result<Asset> openSource(const MesoSurfaceDescription& d) {
     if (d.displacement.empty()) return openMesoAsset(d.asset);
     Asset asset;
     asset.name = d.displacement;
-    VCP_TRY_ASSIGN(asset.heights, readHeightImage(d.displacement, 1));
+    VCP_TRY_ASSIGN(asset.heights, readHeightImage(d.displacement, 1, heightStore()));
     asset.extent = asset.heights->extent();
     return asset;
 }
@@ -120,7 +120,7 @@ public:
         auto& [levels, arrays] = levels_[{sourceOf(d), d.withFilter, fit}];
         if (!levels) {
             if (d.withLightRays) arrays = castingArrays(*asset.heights);
-            LevelFitOptions options{.fit = fit};
+            LevelFitOptions options{.fit = fit, .store = heightStore()};
             if (!d.withFilter) options.mostLevels = 1;
             VCP_TRY_ASSIGN(auto made, HeightLevels::build(std::move(*asset.heights), options));
             levels = std::make_shared<const HeightLevels>(std::move(made));
@@ -292,6 +292,15 @@ Error ScenePlace::blamed(Error error) const {
             .element = fmt::format("line {}", line)};
 }
 
+HeightStore heightStore() {
+    HeightStore store;
+    const auto cache = defaultCacheFolder();
+    std::error_code failed;
+    if (cache) std::filesystem::create_directories(*cache, failed);
+    if (cache && !failed) store.folder = *cache;
+    return store;
+}
+
 Result<Asset> openMesoAsset(const std::string& name) {
     Asset asset;
     const auto isIn = [&](const auto& names) { return std::ranges::find(names, name) != names.end(); };
@@ -305,7 +314,7 @@ Result<Asset> openMesoAsset(const std::string& name) {
             return Error{.code = ErrorCode::Usage,
                          .message = fmt::format(
                              "\"{}\" is neither a procedural height field or solid nor an asset (.meso)", name)};
-        return readAsset(name);
+        return readAsset(name, heightStore());
     }
     VCP_TRY_ASSIGN(const auto shape, shapeOf(asset));
     asset.extent = shape->extent();

@@ -15,6 +15,10 @@
 
 namespace vcp {
 
+/// Where heights that are many are kept: in the folder of the cache (mesh_cache.h), else in the system's for temporary
+/// files.
+meso::HeightStore heightStore();
+
 /// Opens a procedural height field (256 texels) or solid by name, or a .meso file. Errors: Usage (no such name); those
 /// of readAsset.
 Result<meso::Asset> openMesoAsset(const std::string& name);

@@ -90,6 +90,14 @@ TEST(Image, LimitsHoldBeforeTexelsAreAllocated) {
     EXPECT_EQ(decodeImage("GIF89a").error().code, ErrorCode::Unsupported);
 }
 
+/// Returns all bytes that PngBytes has of a file.
+std::string withoutText(std::string_view file) {
+    const auto bytes = randomBytesAt(file);
+    std::string kept(file.size(), '\0');
+    kept.resize(*PngBytes(*bytes).read(kept.data(), kept.size()));
+    return kept;
+}
+
 TEST(Image, TextOfAPngIsNotInflated) {
     const std::string row("\0\x10\x20\x30\x40\x50\x60", 7);  // two texels of RGB
     const std::string plain = test::pngFile(2, 1, 8, 2, row);

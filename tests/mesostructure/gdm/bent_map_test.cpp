@@ -70,12 +70,12 @@ TEST(BentPath, IsAStraightRayOverAnArc) {
 Asset hills() {
     Asset asset;
     asset.name = "hills";
-    HeightMap map{{64, 64}, 0.25, {}};
+    std::vector<uint16_t> heights;
     for (int y = 0; y < 64; ++y)
         for (int x = 0; x < 64; ++x)
-            map.texels.push_back(uint16_t(
+            heights.push_back(uint16_t(
                 std::lround(32767 * (1 + 0.5 * std::cos(2 * M_PI * x / 64) + 0.45 * std::cos(4 * M_PI * y / 64)))));
-    asset.heights = std::move(map);
+    asset.heights = HeightMap{{64, 64}, 0.25, std::move(heights)};
     asset.extent = asset.heights->extent();
     return asset;
 }

@@ -140,9 +140,10 @@ TEST(CertifiedCells, LargerErrorsMakeFewerTriangles) {
 
 /// A map that is flat but for one corner needs cells there alone.
 TEST(CertifiedCells, CellsAreFineWhereTheMapIsSteep) {
-    HeightMap map{{256, 256}, 1, std::vector<uint16_t>(256 * 256, 1000)};
+    std::vector<uint16_t> heights(256 * 256, 1000);
     for (int j = 100; j < 120; ++j)
-        for (int i = 40; i < 60; ++i) map.texels[size_t(i + 256 * j)] = uint16_t((i * 7919 + j * 104729) % 65536);
+        for (int i = 40; i < 60; ++i) heights[size_t(i + 256 * j)] = uint16_t((i * 7919 + j * 104729) % 65536);
+    const HeightMap map{{256, 256}, 1, std::move(heights)};
     auto levels = std::make_shared<HeightLevels>(*HeightLevels::build(map, {.fit = LevelFit::Averaged}));
     const RemeshSurface surface = *buildRemeshSurface(*makeBaseSurface("quad", 1), std::move(levels), 0.1);
     CertifiedCells cells = cellsOf(surface);
@@ -230,10 +231,11 @@ TEST(CertifiedCells, DistantJumpsAreWalls) {
 /// A cliff of the whole range between two texels, on triangles that are long and narrow in the map, whose corners lie
 /// between texels: no cells keep half a pixel at the same place of the base.
 TEST(CertifiedCells, CliffsAreCertified) {
-    HeightMap map{{64, 64}, 1, std::vector<uint16_t>(64 * 64, 0)};
+    std::vector<uint16_t> heights(64 * 64, 0);
     for (int j = 0; j < 64; ++j)
         for (int i = 0; i < 64; ++i)
-            if (i + 2 * j > 40 && 3 * i + j < 70) map.texels[size_t(i + 64 * j)] = uint16_t(60000 + 300 * (i % 7));
+            if (i + 2 * j > 40 && 3 * i + j < 70) heights[size_t(i + 64 * j)] = uint16_t(60000 + 300 * (i % 7));
+    const HeightMap map{{64, 64}, 1, std::move(heights)};
     auto levels = std::make_shared<HeightLevels>(*HeightLevels::build(map, {.fit = LevelFit::Averaged}));
     const dvec2 low(0.03, 0.02), high(0.13, 0.91);
     BaseSurface base{{{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}}, {{0, 1, 2}, {0, 2, 3}}, {}};

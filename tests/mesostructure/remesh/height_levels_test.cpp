@@ -5,6 +5,8 @@
 #include <array>
 #include <cmath>
 #include <random>
+#include <span>
+#include <utility>
 
 #include <gtest/gtest.h>
 
@@ -83,16 +85,17 @@ TEST(HeightLevels, NoSingleHeightImprovesALeastVolume) {
     const double volume = levels.volumes()[2].fitted;
     for (size_t i = 0; i < levels.levels()[2].texels.size(); ++i)
         for (const int by : {-1311, 1311}) {
-            HeightLevel moved = levels.levels()[2];
-            const int height = moved.texels[i] + by;
-            const int x = int(i) % moved.size.x * 4, y = int(i) / moved.size.x * 4;
+            const HeightLevel& level = levels.levels()[2];
+            const int height = level.texels[i] + by;
+            const int x = int(i) % level.size.x * 4, y = int(i) / level.size.x * 4;
             double least = 1, most = 0;
             for (int j = y - 3; j <= y + 3; ++j)
                 for (int k = x - 3; k <= x + 3; ++k)
                     least = std::min(least, map.at(k, j)), most = std::max(most, map.at(k, j));
             if (height / 65535.0 < least || height / 65535.0 > most) continue;
-            moved.texels[i] = uint16_t(height);
-            EXPECT_GE(levelVolume(map, moved), volume * (1 - 1e-3)) << i;
+            std::vector<uint16_t> moved(level.texels.begin(), level.texels.end());
+            moved[i] = uint16_t(height);
+            EXPECT_GE(levelVolume(map, {level.size, std::move(moved)}), volume * (1 - 1e-3)) << i;
         }
 }
 
@@ -126,10 +129,35 @@ TEST(HeightLevels, AveragesAreTheMapsUnderATent) {
                 ASSERT_NEAR(of.at(i, j) * 65535, sum / std::pow(width, 4), 0.51 * double(level)) << level;
             }
     }
-    const HeightLevel odd = averagedLevel({{5, 1}, {10, 20, 30, 40, 50}}, {2, 1});
+    const HeightLevel odd = *averagedLevel({{5, 1}, {10, 20, 30, 40, 50}}, {2, 1});
     // Corners lie at texels 0 and 2.5, and a texel counts by 1 less its distance over 2.5.
     EXPECT_EQ(odd.texels[0], 25);  // (10 + 0.6 * 20 + 0.2 * 30 + 0.2 * 40 + 0.6 * 50) / 2.6
     EXPECT_EQ(odd.texels[1], 35);  // (0.4 * 20 + 0.8 * 30 + 0.8 * 40 + 0.4 * 50) / 2.4
+}
+
+/// Where heights are kept changes none of them.
+TEST(HeightLevels, LevelsInFilesAreThoseInMemory) {
+    const HeightStore inFiles{.mostInMemory = 100};
+    const HeightMap map = mapOf("fbm", 96);
+    auto rows = HeightRows::create(map.size, inFiles);
+    ASSERT_TRUE(rows) << rows.error().line();
+    for (int row = map.size.y; row-- > 0;)
+        ASSERT_TRUE(rows->write(row, std::span(map.texels.data() + size_t(row) * 96, 96)));
+    const HeightMap kept{map.size, map.range, std::move(*rows).take()};
+    EXPECT_TRUE(kept.texels.areInFile());
+    EXPECT_EQ(kept.texels, map.texels);
+    const HeightLevels levels = levelsOf(map, {.fit = LevelFit::Averaged}),
+                       others = levelsOf(kept, {.fit = LevelFit::Averaged, .store = inFiles});
+    ASSERT_EQ(levels.levels().size(), others.levels().size());
+    for (size_t level = 0; level < levels.levels().size(); ++level) {
+        EXPECT_EQ(others.levels()[level].texels, levels.levels()[level].texels) << level;
+        EXPECT_EQ(others.levels()[level].texels.areInFile(), others.levels()[level].texels.size() > 100);
+        others.letGo();
+        EXPECT_EQ(others.levels()[level].texels, levels.levels()[level].texels) << level;
+    }
+    const auto refused = HeightLevels::build(map, {.fit = LevelFit::Averaged, .store = {"/no/such/folder", 100}});
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().code, ErrorCode::Io);
 }
 
 TEST(HeightLevels, ThePrintedFitFallsFromTheMeans) {

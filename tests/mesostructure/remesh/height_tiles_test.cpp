@@ -11,9 +11,10 @@ namespace {
 constexpr int kEdge = RemeshMath<float>::kRemeshTileEdge;
 
 HeightTiles tilesOf(glm::ivec2 size) {
-    HeightMap map{size, 1, {}};
+    std::vector<uint16_t> heights;
     std::mt19937 random(size.x);
-    for (int i = 0; i < size.x * size.y; ++i) map.texels.push_back(uint16_t(random()));
+    for (int i = 0; i < size.x * size.y; ++i) heights.push_back(uint16_t(random()));
+    const HeightMap map{size, 1, std::move(heights)};
     return HeightTiles(std::make_shared<const HeightLevels>(*HeightLevels::build(map, {.fit = LevelFit::Averaged})));
 }
 

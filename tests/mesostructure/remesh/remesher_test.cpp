@@ -289,8 +289,9 @@ TEST(Remesher, NormalsDoNotLookOverEdgesOfTheBase) {
                             {dvec2(0.25, 0.25), dvec2(0.5, 0.5), dvec2(0.25, 0.5)},
                             {dvec2(0.5, 0.25), dvec2(0.75, 0.25), dvec2(0.75, 0.5)},
                             {dvec2(0.5, 0.25), dvec2(0.75, 0.5), dvec2(0.5, 0.5)}}};
-    HeightMap valley{{64, 64}, 1, std::vector<uint16_t>(64 * 64)};
-    for (int i = 0; i < 64 * 64; ++i) valley.texels[size_t(i)] = uint16_t(2000 * std::abs(i % 64 - 32));
+    std::vector<uint16_t> heightsOfValley(64 * 64);
+    for (int i = 0; i < 64 * 64; ++i) heightsOfValley[size_t(i)] = uint16_t(2000 * std::abs(i % 64 - 32));
+    const HeightMap valley{{64, 64}, 1, std::move(heightsOfValley)};
     auto levels = std::make_shared<HeightLevels>(*HeightLevels::build(valley, {.fit = LevelFit::Averaged}));
     const RemeshSurface surface = *buildRemeshSurface(base, levels, 0.5);
     RemeshHeights<double> heights{{levels.get()}};
