@@ -15,6 +15,8 @@
 
 namespace vcp {
 
+using RemeshShareOut = decltype(meso::RemeshOptions::shareOut);
+
 /// A displaced surface and how fine it is remeshed.
 struct RemeshedSurface {
     std::shared_ptr<const meso::RemeshSurface> surface;

@@ -1,6 +1,7 @@
 #include "viewer/viewer.h"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <numbers>
 #include <utility>
@@ -10,6 +11,7 @@
 #include <glm/geometric.hpp>
 
 #include "render/pixel_samples.h"
+#include "viewer/asset/share_out.h"
 #include "viewer/scene/option_values.h"
 
 namespace vcp {
@@ -26,6 +28,8 @@ constexpr double kRefineSeconds = 0.1;
 constexpr double kRefineFrames = 3;
 
 constexpr double kStepPollSeconds = 0.004;
+// What is not measured is said to be less than all.
+constexpr double kAlmostMeasured = 0.999;
 
 constexpr double kZoomPerNotch = 0.85;
 constexpr double kSectionPerNotch = 0.01;  // part of the bounding box's diagonal
@@ -83,6 +87,7 @@ std::string statusLine(const ViewerStatus& status, size_t most) {
     if (status.name.empty()) return device.substr(0, most);
     // The most important parts come first: a narrow window has no room for the rest.
     std::vector<std::string> parts{shortened(status.name, most / 3), textOf(status.detail)};
+    if (status.measuredPart < 1) parts.back() = fmt::format("measuring heights, {:.0f} %", 100 * status.measuredPart);
     if (!status.without.empty()) parts.push_back(status.without);
     if (status.update.drawable && status.levels > 0) {
         const auto [coarsest, finest] = std::pair(status.update.coarsestLevel, status.update.finestLevel);
@@ -571,7 +576,38 @@ Result<NextStep> Viewer::update(double now) {
     hasSettled_ = hasSettled_ || update.settled;
     status_.update = std::move(update);
     if (options_.framesAhead && renderer_->lastDone()) takeStats(*renderer_->lastDone());
-    return nextStep(now);
+    return measuredFirst(nextStep(now));
+}
+
+/// Measures heights for a while where a new picture is to be drawn, which waits until all are measured.
+Result<NextStep> Viewer::measuredFirst(NextStep next) {
+    status_.measuredPart = 1;
+    if (givenUp_ != request_) givenUp_.reset();
+    if (givenUp_) next.draw = false;
+    if (!next.draw || addsSample_) return next;
+    using Clock = std::chrono::steady_clock;
+    const auto until = Clock::now() + std::chrono::duration<double, std::milli>(options_.measuringMs);
+    double part = 0;
+    int asked = 0;
+    const auto chosen = renderer_->chooseCells(request_, [&](size_t count, const auto& fill) {
+        return shareOut(count, fill, [&](double done) {
+            part = done;
+            // The first question comes before anything is measured.
+            return asked++ == 0 || Clock::now() < until;
+        });
+    });
+    if (chosen) return next;
+    if (chosen.error().code != ErrorCode::Cancelled) return chosen.error();
+    status_.measuredPart = std::min(part, kAlmostMeasured);
+    status_.update.settled = false;
+    return NextStep{.draw = false, .waitSeconds = 0};
+}
+
+bool Viewer::cancelMeasuring() {
+    if (status_.measuredPart == 1) return false;
+    givenUp_ = request_;
+    status_.measuredPart = 1;
+    return true;
 }
 
 bool Viewer::goesOnDrawing() const { return renderer_->isUnfinished() && request_ == begun_; }

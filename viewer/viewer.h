@@ -3,7 +3,7 @@
 // The host hands in what happens, asks what to do, and does it:
 //
 //   viewer->resize(size); viewer->press(...); viewer->move(...); viewer->key(...);
-//   next = viewer->update(now);          // never waits; takes in pages, chooses the resolution
+//   next = viewer->update(now);          // never waits long; takes in pages, chooses the resolution
 //   if (next.draw && viewer->draw()) viewer->renderer().present(...);
 //   wait for events, at most next.waitSeconds
 //
@@ -77,6 +77,9 @@ struct ViewerOptions {
     double movingFrameMs = 50;
     double moveSeconds = 0.3;  ///< time that a smooth move takes; 0: at once
     uint32_t samples = 1;      ///< of a picture at rest (samplesOf in render/pixel_samples.h)
+    /// An update measures the heights of remeshed surfaces for so long; the next one goes on. Nothing is drawn until
+    /// all are measured.
+    double measuringMs = 60;
     /// draw() returns when the frame is handed to the GPU (Renderer::renderAhead), for hosts that only show pictures.
     /// The status then tells of the newest frame that has ended. Such a host calls waitForFrame() before it draws.
     bool framesAhead = false;
@@ -96,10 +99,11 @@ struct ViewerStatus {
     uint32_t levels = 0;
     UpdateResult update;
     Detail detail = Detail::Loading;
-    FrameStats frame;      ///< statistics of the last draw(), or of the newest frame that has ended (framesAhead)
-    double drawnPart = 1;  ///< of the picture that is being drawn, 0 to 1; 1: none is
-    int reduction = 1;     ///< the last picture has 1/reduction of the width and height
-    uint32_t samples = 0;  ///< whole samples of the last picture
+    FrameStats frame;         ///< statistics of the last draw(), or of the newest frame that has ended (framesAhead)
+    double measuredPart = 1;  ///< of the heights that the next picture is made of, 0 to 1; 1: all is measured
+    double drawnPart = 1;     ///< of the picture that is being drawn, 0 to 1; 1: none is
+    int reduction = 1;        ///< the last picture has 1/reduction of the width and height
+    uint32_t samples = 0;     ///< whole samples of the last picture
     std::string device;
     bool software = false;
     uint64_t budgetBytes = 0;
@@ -169,6 +173,9 @@ public:
 
     /// Takes in pages and says what to do next. Errors: those of Renderer::update; problems of pages go to the status.
     Result<NextStep> update(double now);
+    /// Ends the measuring of heights for the picture of now, which is not drawn then. Returns false where nothing is
+    /// measured.
+    bool cancelMeasuring();
     /// Draws what the last update chose: a picture, or a part of a sample of the last one. Returns whether there is
     /// something new to present: a picture or a whole sample.
     Result<bool> draw();
@@ -269,6 +276,7 @@ private:
     [[nodiscard]] FrameRequest requestWith(int reduction) const;
     [[nodiscard]] bool refinementIsDue(double now) const;
     [[nodiscard]] NextStep nextStep(double now);
+    Result<NextStep> measuredFirst(NextStep next);
     Result<bool> drawSample();
     /// Whether the frame that was begun is still what is to be drawn.
     [[nodiscard]] bool goesOnDrawing() const;
@@ -322,9 +330,10 @@ private:
 
     FrameRequest request_;  ///< request of the last update
     int requestReduction_ = 1;
-    std::optional<FrameRequest> drawn_;  ///< request of the last draw
-    FrameRequest begun_;                 ///< request of the frame that is drawn step by step
-    OrbitCamera seen_;                   ///< the camera of the last update
+    std::optional<FrameRequest> drawn_;    ///< request of the last draw
+    std::optional<FrameRequest> givenUp_;  ///< a request that is not drawn, for its heights are not to be measured
+    FrameRequest begun_;                   ///< request of the frame that is drawn step by step
+    OrbitCamera seen_;                     ///< the camera of the last update
     double movedAt_ = -std::numeric_limits<double>::infinity();
     double drawnAt_ = -std::numeric_limits<double>::infinity();
     double now_ = 0;

@@ -231,6 +231,13 @@ Result<void> MesoSurfacePass::prepare(MesoTarget& target, const Picture& picture
     return {};
 }
 
+Result<void> MesoSurfacePass::chooseCells(const FrameRequest& request, const RemeshShareOut& shareOut) const {
+    for (const Placed& surface : surfaces_)
+        if (surface.remeshed.surface)
+            VCP_TRY(RemeshRaster::chooseCells(surface.remeshed, remeshLook(request), shareOut));
+    return {};
+}
+
 void MesoSurfacePass::fillBaseLight(const Placed& surface, MesoTarget::Drawing::BaseLight& light,
                                     const Shading& shading) {
     if (light.filled.bytes() == 0) return;

@@ -93,6 +93,8 @@ public:
     /// Makes buffers and pipelines, and the pieces of what is remeshed. Precondition: there are surfaces, and no frame
     /// in flight uses the target. Errors: Device, Limit, Unsupported.
     Result<void> prepare(MesoTarget& target, const Picture& picture, const FrameRequest& request);
+    /// Does ahead what takes long in prepare(): chooses the certified cells of what is remeshed. Errors: Cancelled.
+    Result<void> chooseCells(const FrameRequest& request, const RemeshShareOut& shareOut) const;
     /// Records what finds the hits. Precondition: prepare() with the same picture.
     void recordHits(VkCommandBuffer commands, MesoTarget& target, const FrameRequest& request, const Picture& picture);
     /// Records a ray of light from all that the picture shows. `ray.isLast`: nothing comes after the surfaces.

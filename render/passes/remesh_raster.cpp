@@ -62,6 +62,15 @@ Result<RasterPipeline> createRemeshPipeline(const Device& device) {
                                            .colours = {kRemeshColours.begin(), kRemeshColours.end()}});
 }
 
+Result<void> RemeshRaster::chooseCells(const RemeshedSurface& surface, const RemeshLook& look,
+                                       const RemeshShareOut& shareOut) {
+    if (!surface.cells) return {};
+    meso::RemeshOptions options = surface.options;
+    options.shareOut = shareOut;
+    meso::RemeshCounts counts;
+    return surface.cells->choose(cameraOf(*surface.surface, look), options, counts);
+}
+
 Result<void> RemeshRaster::prepare(RemeshTarget& target, PictureSize size, size_t surfaces) {
     if (!pipeline_.exists()) {
         VCP_TRY_ASSIGN(pipeline_, createRemeshPipeline(device_));

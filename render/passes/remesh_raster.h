@@ -54,6 +54,11 @@ class RemeshRaster {
 public:
     explicit RemeshRaster(Device& device) : device_(device), sweep_(device) {}
 
+    /// Chooses a surface's certified cells, as remesh() does. `shareOut`: in place of the surface's own. Errors:
+    /// Cancelled.
+    static Result<void> chooseCells(const RemeshedSurface& surface, const RemeshLook& look,
+                                    const RemeshShareOut& shareOut);
+
     /// Makes the images. Errors: Device; Limit; Unsupported, as RasterPipeline::create.
     Result<void> prepare(RemeshTarget& target, PictureSize size, size_t surfaces);
     /// Makes and uploads the pieces of a surface for a view. `heights`: the surface's.

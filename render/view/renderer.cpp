@@ -131,6 +131,14 @@ std::span<const MesoSurface> Renderer::surfaces() const {
     return s.meso ? std::span<const MesoSurface>(s.meso->surfaces) : std::span<const MesoSurface>();
 }
 
+Result<void> Renderer::chooseCells(
+    const FrameRequest& request,
+    const std::function<bool(size_t count, const std::function<void(size_t first, size_t last)>& fill)>& shareOut) {
+    const Shared& s = *view_->shared;
+    if (!s.meso || view_->isCastOnHost()) return {};
+    return s.meso->pass->chooseCells(request, shareOut);
+}
+
 void Renderer::close() {
     Shared& s = *view_->shared;
     s.hidePool();

@@ -101,6 +101,13 @@ public:
     /// when it has nothing else to do. Other calls never wait for reads.
     void waitForPage(std::chrono::milliseconds timeout) override;
 
+    /// Does ahead what takes long in drawing remeshed surfaces: chooses their cells for a picture. `shareOut`: as in
+    /// meso::RemeshOptions; where it cancels, nothing is lost, and the next call for the same picture goes on there.
+    /// Errors: Cancelled.
+    Result<void> chooseCells(
+        const FrameRequest& request,
+        const std::function<bool(size_t count, const std::function<void(size_t first, size_t last)>& fill)>& shareOut);
+
     /// Draws the cut of the last update and waits for the GPU. Without a dataset it draws the background.
     Result<FrameStats> render(const FrameRequest& request, const std::function<bool()>& cancel = {}) override;
 

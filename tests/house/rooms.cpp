@@ -54,7 +54,7 @@ const std::vector<Room>& rooms() {
           "viewer/camera", "viewer/asset"}},
         {"viewer/picture", {"octree/", "render"}},
         {"viewer/export", {"octree/", "builder/", "render", "viewer/annotation", "viewer/camera"}},
-        {"viewer", {"octree/", "render", "viewer/camera", "viewer/scene"}},
+        {"viewer", {"octree/", "render", "viewer/camera", "viewer/asset", "viewer/scene"}},
         {"viewer/bake",
          {"octree/", "builder/", "mesostructure/", "render", "viewer/annotation", "viewer/camera", "viewer/scene",
           "viewer/picture", "viewer/asset", "viewer/export", "viewer"}},

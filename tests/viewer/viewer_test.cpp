@@ -784,6 +784,50 @@ TEST_F(ViewerTest, SurfacesAreShownWithAndWithoutDatasets) {
     EXPECT_FALSE(viewer_->open(std::vector<PlacedDataset>{}, MesoScene{}, viewer_->camera(), "nothing"));
 }
 
+/// A host's loop goes round while heights are measured, and nothing is drawn until they are.
+TEST_F(ViewerTest, HeightsAreMeasuredInPartsAndMeasuringCanBeCancelled) {
+    MesoSurfaceDescription relief;
+    relief.asset = "ridged", relief.base = "torus", relief.tiles = 4, relief.method.name = kRemeshMethod;
+    OrbitCamera camera;
+    for (const bool isCancelled : {false, true}) {
+        const auto surfaces = makeMesoScene({&relief, 1});
+        ASSERT_TRUE(surfaces) << surfaces.error().line();
+        ViewerOptions options;
+        options.measuringMs = 0;
+        viewer_ = *Viewer::create(options);
+        viewer_->resize(kSize);
+        camera.look(View::Isometric, surfaces->bounds, kSize);
+        ASSERT_TRUE(viewer_->open({}, *surfaces, camera, "relief"));
+        EXPECT_FALSE(viewer_->cancelMeasuring());
+        std::vector<double> parts;
+        while (!turn(0.1)) {
+            parts.push_back(viewer_->status().measuredPart);
+            ASSERT_LT(parts.back(), 1);
+            EXPECT_FALSE(viewer_->status().update.settled);
+            EXPECT_EQ(next_.waitSeconds, 0);
+            EXPECT_NE(statusLine(viewer_->status()).find("measuring heights, "), std::string::npos);
+            if (isCancelled && parts.size() == 2) break;
+        }
+        EXPECT_TRUE(std::ranges::is_sorted(parts));
+        if (!isCancelled) {
+            EXPECT_GT(parts.size(), 2u);
+            EXPECT_EQ(viewer_->status().measuredPart, 1);
+            settle();
+            EXPECT_GT(viewer_->status().frame.remeshedPixels, 0);
+            continue;
+        }
+        ASSERT_EQ(parts.size(), 2u);
+        EXPECT_TRUE(viewer_->cancelMeasuring());
+        for (int i = 0; i < 3; ++i) EXPECT_FALSE(turn(1));
+        EXPECT_EQ(viewer_->framesDrawn(), 0u);
+        // Another view is measured, and drawn.
+        viewer_->scroll(glm::dvec2(kSize) / 2.0, 1);
+        for (int i = 0; i < 1000 && !turn(0.1); ++i) {
+        }
+        EXPECT_EQ(viewer_->framesDrawn(), 1u);
+    }
+}
+
 TEST_F(ViewerTest, WhatMovesGoesOnUntilItIsToStay) {
     openViewer();
     EXPECT_EQ(viewer_->whyWithout(ViewerAction::TogglePlay), "nothing moves in this scene");

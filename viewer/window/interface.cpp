@@ -225,6 +225,8 @@ std::string Interface::stateText() const {
     const UpdateResult& update = status.update;
     const std::string error = formatPixels(refinedPixels(update)) + " px";
     // In steps of 5: each new text is a new picture of the window.
+    if (status.measuredPart < 1)
+        return fmt::format("Measuring heights, {:.0f} %; Esc ends it", 5 * std::floor(20 * status.measuredPart));
     if (status.drawnPart < 1) return fmt::format("Drawing, {:.0f} %", 5 * std::floor(20 * status.drawnPart));
     switch (status.detail) {
         case Detail::Loading:

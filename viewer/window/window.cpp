@@ -450,6 +450,8 @@ private:
             session_->opening()->cancel();
         else if (session_->saving())
             session_->cancelSaving();
+        else if (session_->viewer().cancelMeasuring())
+            session_->note("cancelled: the picture is drawn where the camera moves on");
         else if (session_->viewer().isFlying())
             toggleFly();
         else if (session_->clicks() != ViewSession::Clicks::Nothing)
