@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 
 #include <fmt/format.h>
@@ -55,7 +56,7 @@ Result<void> checkAgainstEntry(const ByteReader& reader, const Dataset& dataset,
 
 bool fillsSubvolume(const PaperPageHeader& page, uint32_t log2Cells) {
     return page.cellShift == 0 && page.rootLevel == log2Cells &&
-           std::ranges::all_of(page.roots, [](uint32_t roots) { return roots == 1; });
+           std::all_of(std::begin(page.roots), std::end(page.roots), [](uint32_t roots) { return roots == 1; });
 }
 
 }  // namespace

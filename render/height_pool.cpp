@@ -12,9 +12,9 @@ namespace {
 using meso::HeightTiles;
 
 constexpr uint64_t kTileBytes = uint64_t{16} * HeightTiles::kQuads;
-// What a read may hold, and what an update takes in.
 // Maps of so many tiles are loaded whole where there is room: up to 2,048 x 2,048 texels.
 constexpr uint32_t kMostLoadedWhole = 350;
+// What a read may hold, and what an update takes in.
 constexpr uint64_t kHeldBytes = uint64_t{64} << 20, kMostTaken = uint64_t{16} << 20;
 
 /// The tiles of a map as pages.

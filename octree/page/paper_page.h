@@ -13,8 +13,7 @@
 //
 // Node word: inner [0, 2^30): number of its first child, greater than its own; empty [2^30, 2^31): 2^30 plus the
 // distance that the node is from the surface, 2^30 - 1 being `cutoff`; leaf -(i + 1): its corners are slices i and i
-// + 1. Lengths are in the page's
-// cells.
+// + 1. Lengths are in the page's cells.
 #pragma once
 
 #include <cstddef>

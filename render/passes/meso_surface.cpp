@@ -21,8 +21,8 @@ constexpr VkBufferUsageFlags kConstantsUse = VK_BUFFER_USAGE_UNIFORM_BUFFER_BIT 
 
 PictureSize sizeOf(const FrameRequest& request) { return {request.width, request.height}; }
 
-// What a pipeline casts (kRays of shaders/meso_surface.comp).
 constexpr uint32_t kConstantOfAllTiles = 10;  // kAllTiles of shaders/remesh_merge.comp
+// What a pipeline casts (kRays of shaders/meso_surface.comp).
 constexpr uint32_t kPictureRays = 0, kRaysToLights = 1, kRayToLight = 2, kRayIntoSky = 3;
 
 VkBuffer handleOf(const Buffer* buffer) { return buffer != nullptr ? buffer->handle() : VK_NULL_HANDLE; }
