@@ -308,7 +308,8 @@ private:
         for (const Prism& prism : prisms) middles.add(prism.box.middle(), prism.box.middle());
         // Halves keep the tree within the depth that casting has room for.
         const bool isDeep = depth + uint32_t(std::bit_width(prisms.size())) >= Shell::kDepth - 2;
-        const auto [axis, plane] = isDeep ? std::pair(0, 0) : leastPlane(prisms, middles);
+        const std::pair<int, int> best = isDeep ? std::pair(0, 0) : leastPlane(prisms, middles);
+        const int axis = best.first, plane = best.second;
         if (plane > 0) {
             const auto second = std::partition(prisms.begin(), prisms.end(),
                                                [&](const Prism& prism) { return binOf(prism, middles, axis) < plane; });

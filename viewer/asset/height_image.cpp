@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <cstdio>
 #include <cstring>
 #include <memory>
 #include <optional>
@@ -14,6 +15,7 @@
 
 #include "builder/stream/random_bytes.h"
 #include "builder/texture/png_chunks.h"
+#include "octree/io/regular_file.h"
 #include "viewer/asset/exr_picture.h"
 #include "viewer/asset/picture_file.h"
 
@@ -177,11 +179,12 @@ Result<meso::HeightMap> decodeHeights(std::span<const std::byte> file, double ra
 
 Result<meso::HeightMap> readHeightImage(const std::filesystem::path& path, double range,
                                         const meso::HeightStore& store) {
-    VCP_TRY_ASSIGN(const auto file, openRandomBytes(path));
+    VCP_TRY_ASSIGN(const auto stream, openRegularStream(path));
     char start[kPngSignature.size()] = {};
-    if (file->size() >= sizeof start) VCP_TRY(file->read(0, start, sizeof start));
+    const size_t got = std::fread(start, 1, sizeof start, stream.get());
+    VCP_TRY_ASSIGN(const auto file, openRandomBytes(path));
     // A PNG is read as it is decoded.
-    if (std::string_view(start, sizeof start) == kPngSignature && file->size() <= kMostPictureBytes) {
+    if (std::string_view(start, got) == kPngSignature && file->size() <= kMostPictureBytes) {
         auto map = pngHeights(*file, range, store);
         if (map) return map;
         Error error = map.error();
