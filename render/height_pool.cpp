@@ -12,8 +12,8 @@ namespace {
 using meso::HeightTiles;
 
 constexpr uint64_t kTileBytes = uint64_t{16} * HeightTiles::kQuads;
-// Maps of so many tiles are loaded whole where there is room: up to 2,048 x 2,048 texels.
-constexpr uint32_t kMostLoadedWhole = 350;
+// Maps of so many tiles are loaded whole where there is room: up to 1,024 x 1,024 texels.
+constexpr uint32_t kMostLoadedWhole = 100;
 // What a read may hold, and what an update takes in.
 constexpr uint64_t kHeldBytes = uint64_t{64} << 20, kMostTaken = uint64_t{16} << 20;
 
@@ -61,9 +61,9 @@ Result<std::unique_ptr<HeightPool>> HeightPool::create(Device& device,
                      .message = fmt::format("the heights of a remeshed surface take {} bytes at least, and {} are left "
                                             "for them: allow more",
                                             bytesFor(tiles, least), most)};
-    const uint64_t table = bytesFor(tiles, 0);
-    const auto slots =
-        uint32_t(std::clamp<uint64_t>((most - std::min(table, most)) / kTileBytes, least, uint64_t{tiles.count()}));
+    // Whole units; `most` has room for the table and some tiles, as was seen.
+    const uint64_t quads = most / kPoolUnitBytes * kPoolUnitBytes / 16 - tiles.tableQuads();
+    const auto slots = uint32_t(std::min<uint64_t>(quads / HeightTiles::kQuads, tiles.count()));
     std::unique_ptr<HeightPool> made(new HeightPool(heights, slots));
     VCP_TRY_ASSIGN(made->pool_, PagePool::create(device, bytesFor(tiles, slots), PageAccess::TexelBuffer));
     VCP_TRY_ASSIGN(made->marks_,

@@ -163,6 +163,28 @@ protected:
     }
 };
 
+TEST_F(StreamedHeights, SmallMapsAreThereWhole) {
+    startWith(uint64_t{1} << 30);
+    // Of square maps with these edges the bytes of all tiles end anywhere within a unit of the pool.
+    for (const int texels : {256, 384, 640, 896, 1024}) {
+        SCOPED_TRACE(texels);
+        auto levels = std::make_shared<const HeightLevels>(
+            *HeightLevels::build(*makeHeightField("fbm", texels, 1), {.fit = LevelFit::Averaged}));
+        MesoSurface whole;
+        whole.remeshed = {
+            std::make_shared<const RemeshSurface>(*buildRemeshSurface(*makeBaseSurface("quad", 1), levels, 0.1)),
+            {.errorPixels = 0.5}};
+        whole.remeshed.cells = std::make_shared<CertifiedCells>(*CertifiedCells::create(*whole.remeshed.surface));
+        ASSERT_TRUE(renderer_->setSurfaces(std::span(&whole, 1)));
+        for (const double distance : {3.0, 0.5}) {
+            const FrameStats drawn = draw(lookFrom({0, 0, distance}));
+            EXPECT_EQ(drawn.missingHeights, 0u);
+            EXPECT_GT(drawn.remeshedPixels, 0);
+            EXPECT_EQ(drawn.heightBytes, HeightTiles(levels).count() * kTile);
+        }
+    }
+}
+
 TEST_F(StreamedHeights, AViewLoadsWhatItReads) {
     startWith(uint64_t{1} << 30);
     ASSERT_TRUE(renderer_->setSurfaces(std::span(&surface(), 1)));
