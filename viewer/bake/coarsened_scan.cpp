@@ -28,7 +28,7 @@ using meso::BaseSurface;
 constexpr uint64_t kMostOfRun = 1'000'000, kFewestOfRun = 2'000;
 constexpr uint64_t kRunBytes = 600;  // memory for each triangle of a run, from reading to what it is simplified to
 constexpr uint64_t kSamples = 50'000, kFewestSamples = 64;  // that say how far the scan is away
-constexpr double kReading = 0.95;                           // of the work; the rest is done when all is read
+constexpr double kReadPart = 0.95;                          // of the work; the rest is done when all is read
 
 /// A run of the scan's triangles, as they are or simplified.
 struct Run {
@@ -113,7 +113,7 @@ public:
 
     Result<CoarsenedScan> run() {
         const StreamOptions streaming{.colour = false,
-                                      .progress = [this](double part) { return told(kReading * part); }};
+                                      .progress = [this](double part) { return told(kReadPart * part); }};
         VCP_TRY(streamFacets(reader_, cut_, streaming, true,
                              [this](std::span<const Facet> facets) { return take(facets); }));
         VCP_TRY(closeRun());
