@@ -13,6 +13,8 @@
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
 
+#include "octree/surface/area_split.h"
+
 namespace vcp::meso {
 
 namespace {
@@ -232,28 +234,14 @@ private:
     std::vector<double> reaches_;  // of the columns, parts of the height
 };
 
-struct Box {
-    dvec3 low{std::numeric_limits<double>::infinity()}, high = -low;
-
-    void add(dvec3 lower, dvec3 upper) { low = glm::min(low, lower), high = glm::max(high, upper); }
-    void add(const Box& other) { add(other.low, other.high); }
-    [[nodiscard]] dvec3 middle() const { return 0.5 * (low + high); }
-    /// Returns half the area of its sides.
-    [[nodiscard]] double area() const {
-        const dvec3 size = glm::max(high - low, dvec3(0));
-        return size.x * size.y + size.y * size.z + size.z * size.x;
-    }
-};
-
-/// Makes the tree over prisms, whose pieces follow each other: a prism a leaf. Splits lie where the areas of both
-/// sides' boxes, each times its number of prisms, have the least sum (Wald 2007: by bins of middles).
+/// Makes the tree over prisms, whose pieces follow each other: a prism a leaf.
 class TreeMaker {
 public:
     explicit TreeMaker(const std::vector<Piece>& pieces) {
         for (size_t first = 0, last = 0; first < pieces.size(); first = last) {
             Prism prism;
             prism.first = uint32_t(first);
-            do prism.box.add(pieces[last].low(), pieces[last].high());
+            do prism.box.add({pieces[last].low(), pieces[last].high()});
             while (++last < pieces.size() && isSamePrism(pieces[last - 1], pieces[last]));
             prism.pieces = uint32_t(last - first);
             prisms_.push_back(prism);
@@ -270,11 +258,10 @@ public:
 private:
     struct Prism {
         uint32_t first = 0, pieces = 0;
-        Box box;
+        Bounds box;
+        [[nodiscard]] dvec3 middle() const { return 0.5 * (box.low + box.high); }
     };
     using Prisms = std::span<Prism>;
-
-    static constexpr int kBins = 16;
 
     /// Whether a piece belongs to the prism of the piece before it.
     static bool isSamePrism(const Piece& before, const Piece& piece) {
@@ -283,7 +270,7 @@ private:
     }
 
     void make(size_t node, Prisms prisms, uint32_t depth, std::vector<uint32_t>& order) {
-        Box box;
+        Bounds box;
         for (const Prism& prism : prisms) box.add(prism.box);
         // Boxes are widened by more than single precision rounds.
         const dvec3 slack = 1e-6 * (glm::abs(box.low) + glm::abs(box.high)) + 1e-5 * (box.high - box.low);
@@ -304,62 +291,30 @@ private:
 
     /// Puts the prisms of the first side first. Returns how many these are.
     static size_t split(Prisms prisms, uint32_t depth) {
-        Box middles;
-        for (const Prism& prism : prisms) middles.add(prism.box.middle(), prism.box.middle());
         // Halves keep the tree within the depth that casting has room for.
         const bool isDeep = depth + uint32_t(std::bit_width(prisms.size())) >= Shell::kDepth - 2;
-        const std::pair<int, int> best = isDeep ? std::pair(0, 0) : leastPlane(prisms, middles);
-        const int axis = best.first, plane = best.second;
-        if (plane > 0) {
-            const auto second = std::partition(prisms.begin(), prisms.end(),
-                                               [&](const Prism& prism) { return binOf(prism, middles, axis) < plane; });
-            return size_t(second - prisms.begin());
-        }
+        const AreaSplit plane = isDeep ? AreaSplit()
+                                       : cheapestSplit(
+                                             uint32_t(prisms.size()), [&](uint32_t i) { return prisms[i].middle(); },
+                                             [&](uint32_t i) { return prisms[i].box; });
+        size_t first = 0;
+        if (plane.axis >= 0)
+            first = size_t(std::partition(prisms.begin(), prisms.end(),
+                                          [&](const Prism& p) { return p.middle()[plane.axis] < plane.position; }) -
+                           prisms.begin());
+        return first > 0 && first < prisms.size() ? first : halve(prisms);
+    }
+
+    /// Does so at the median along the longest axis.
+    static size_t halve(Prisms prisms) {
+        Bounds middles;
+        for (const Prism& prism : prisms) middles.add(prism.middle());
         const dvec3 size = middles.high - middles.low;
         const int longest = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
         const size_t half = prisms.size() / 2;
-        std::nth_element(
-            prisms.begin(), prisms.begin() + std::ptrdiff_t(half), prisms.end(),
-            [&](const Prism& a, const Prism& b) { return a.box.middle()[longest] < b.box.middle()[longest]; });
+        std::nth_element(prisms.begin(), prisms.begin() + std::ptrdiff_t(half), prisms.end(),
+                         [&](const Prism& a, const Prism& b) { return a.middle()[longest] < b.middle()[longest]; });
         return half;
-    }
-
-    /// Returns the best plane: its axis, and the first bin behind it; 0: there is none.
-    static std::pair<int, int> leastPlane(Prisms prisms, const Box& middles) {
-        std::pair<int, int> best{0, 0};
-        double least = std::numeric_limits<double>::infinity();
-        for (int axis = 0; axis < 3; ++axis) {
-            if (!(middles.high[axis] > middles.low[axis])) continue;
-            std::array<Box, kBins> boxes;
-            std::array<size_t, kBins> counts{};
-            for (const Prism& prism : prisms) {
-                const auto bin = size_t(binOf(prism, middles, axis));
-                boxes[bin].add(prism.box);
-                ++counts[bin];
-            }
-            std::array<double, kBins> behind{};  // of the bins from here on
-            Box box;
-            size_t count = 0;
-            for (size_t bin = kBins; bin-- > 1;) {
-                box.add(boxes[bin]);
-                count += counts[bin];
-                behind[bin] = count > 0 ? double(count) * box.area() : std::numeric_limits<double>::infinity();
-            }
-            box = {};
-            count = 0;
-            for (size_t bin = 1; bin < kBins; ++bin) {
-                box.add(boxes[bin - 1]);
-                count += counts[bin - 1];
-                const double cost = count > 0 ? double(count) * box.area() + behind[bin] : least;
-                if (cost < least) least = cost, best = {axis, int(bin)};
-            }
-        }
-        return best;
-    }
-
-    static int binOf(const Prism& prism, const Box& middles, int axis) {
-        const double part = (prism.box.middle()[axis] - middles.low[axis]) / (middles.high[axis] - middles.low[axis]);
-        return std::clamp(int(part * kBins), 0, kBins - 1);
     }
 
     std::vector<Prism> prisms_;

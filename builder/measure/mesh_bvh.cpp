@@ -10,13 +10,14 @@
 #include <glm/geometric.hpp>
 #include <glm/vector_relational.hpp>
 
+#include "octree/surface/area_split.h"
+
 namespace vcp {
 
 namespace {
 
 constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
 constexpr uint32_t kLeafTriangles = 4;
-constexpr int kBins = 16;
 
 /// Returns the point of segment a b nearest to the coordinate origin.
 glm::dvec3 closestOfSegment(glm::dvec3 a, glm::dvec3 b) {
@@ -44,71 +45,10 @@ double boxDistance2(glm::dvec3 p, glm::dvec3 low, glm::dvec3 high) {
     return glm::dot(out, out);
 }
 
-struct Bounds {
-    glm::dvec3 low{kInfinity}, high{-kInfinity};
-    void add(glm::dvec3 p) {
-        low = glm::min(low, p);
-        high = glm::max(high, p);
-    }
-    void add(const Bounds& o) {
-        low = glm::min(low, o.low);
-        high = glm::max(high, o.high);
-    }
-    [[nodiscard]] double halfArea() const {
-        const glm::dvec3 e = high - low;
-        return e.x < 0 ? 0 : e.x * e.y + e.y * e.z + e.z * e.x;
-    }
-};
-
 Bounds triangleBounds(const IndexedMesh& mesh, uint32_t triangle) {
     Bounds bounds;
     for (const glm::dvec3& p : mesh.corners(triangle)) bounds.add(p);
     return bounds;
-}
-
-struct Split {
-    int axis = -1;
-    double position = 0;
-};
-
-/// Returns the cheapest of 16 planes an axis by surface area; axis -1 where all centres agree.
-Split cheapestSplit(const IndexedMesh& mesh, const uint32_t* triangles, uint32_t count,
-                    const std::vector<glm::dvec3>& centres) {
-    Bounds spread;
-    for (uint32_t i = 0; i < count; ++i) spread.add(centres[triangles[i]]);
-    Split best;
-    double bestCost = kInfinity;
-    for (int axis = 0; axis < 3; ++axis) {
-        const double width = spread.high[axis] - spread.low[axis];
-        if (!(width > 0)) continue;
-        std::array<Bounds, kBins> bins;
-        std::array<uint32_t, kBins> counts{};
-        for (uint32_t i = 0; i < count; ++i) {
-            const double at = (centres[triangles[i]][axis] - spread.low[axis]) / width * kBins;
-            const int bin = std::min(int(at), kBins - 1);
-            bins[bin].add(triangleBounds(mesh, triangles[i]));
-            ++counts[bin];
-        }
-        std::array<double, kBins> rightCost{};
-        Bounds right;
-        uint32_t rightCount = 0;
-        for (int bin = kBins - 1; bin > 0; --bin) {
-            right.add(bins[bin]);
-            rightCount += counts[bin];
-            rightCost[bin] = right.halfArea() * rightCount;
-        }
-        Bounds left;
-        uint32_t leftCount = 0;
-        for (int bin = 1; bin < kBins; ++bin) {
-            left.add(bins[bin - 1]);
-            leftCount += counts[bin - 1];
-            const double cost = left.halfArea() * leftCount + rightCost[bin];
-            if (leftCount == 0 || leftCount == count || cost >= bestCost) continue;
-            bestCost = cost;
-            best = {axis, spread.low[axis] + width * bin / kBins};
-        }
-    }
-    return best;
 }
 
 }  // namespace
@@ -210,7 +150,9 @@ void MeshBvh::split(uint32_t root, std::vector<glm::dvec3>& centres) {
         const uint32_t first = nodes_[number].first, count = nodes_[number].count;
         if (count <= kLeafTriangles) continue;
         uint32_t* begin = order_.data() + first;
-        const Split plane = cheapestSplit(*mesh_, begin, count, centres);
+        const AreaSplit plane = cheapestSplit(
+            count, [&](uint32_t i) { return centres[begin[i]]; },
+            [&](uint32_t i) { return triangleBounds(*mesh_, begin[i]); });
         uint32_t left = count / 2;
         if (plane.axis >= 0)
             left = uint32_t(std::partition(begin, begin + count,

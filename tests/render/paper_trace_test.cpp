@@ -6,7 +6,7 @@
 
 #include "builder/paper/paper_file.h"
 #include "streaming/page_source.h"
-#include "tests/support/mesh_files.h"
+#include "tests/support/paper_subvolumes.h"
 #include "tests/support/renderer_fixture.h"
 #include "tests/support/test_folder.h"
 #include "tests/support/test_meshes.h"
@@ -152,15 +152,7 @@ TEST_F(PaperTrace, EveryRuleIsTheCpus) {
 /// A file in subvolumes of 16 cells, and the same mesh as one octree.
 struct SubvolumeScene {
     SubvolumeScene() : folder("vcp_paper_trace_test"), one(test::torusMesh({0.3, 0.2, 0.1}, 2, 0.8, 90, 40), kCell) {
-        const std::filesystem::path ply = folder / "mesh.ply", file = folder / "mesh.vcp";
-        test::writePly(one.mesh, ply);
-        BuildOptions build;
-        build.inputs = {ply};
-        build.output = file;
-        build.cell = kCell;
-        PaperOptions paper;
-        paper.subvolumeCells = 16;
-        EXPECT_TRUE(buildPaperFile(build, paper));
+        const std::filesystem::path file = test::buildSubvolumes(folder, one.mesh, kCell);
         const std::shared_ptr<const ByteReader> reader = *openFile(file);
         dataset = std::make_shared<const Dataset>(*readDataset(*reader));
         source = std::make_shared<const FilePageSource>(reader, dataset);

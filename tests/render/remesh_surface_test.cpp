@@ -165,7 +165,7 @@ protected:
 
 TEST_F(StreamedHeights, SmallMapsAreThereWhole) {
     startWith(uint64_t{1} << 30);
-    // Of square maps with these edges the bytes of all tiles end anywhere within a unit of the pool.
+    // The bytes of all tiles of such square maps end anywhere within a unit of the pool.
     for (const int texels : {256, 384, 640, 896, 1024}) {
         SCOPED_TRACE(texels);
         auto levels = std::make_shared<const HeightLevels>(

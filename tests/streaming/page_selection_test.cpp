@@ -87,7 +87,7 @@ TEST(PageSelection, CoarseFromFarFineFromNear) {
         }
 }
 
-/// Of the method Paper, with subvolumes everywhere; nothing is certified.
+/// The dataset is of the method Paper and has subvolumes everywhere; nothing is certified.
 Dataset paperTree(uint32_t levels) {
     Dataset dataset = fullTree(levels, 0);
     dataset.header.method = Method::Paper;

@@ -10,7 +10,7 @@
 #include "builder/paper/paper_file.h"
 #include "builder/paper/paper_octree.h"
 #include "builder/paper/region_growing.h"
-#include "tests/support/mesh_files.h"
+#include "tests/support/paper_subvolumes.h"
 #include "tests/support/test_folder.h"
 #include "tests/support/test_meshes.h"
 #include "viewer/bench/peers/distance_octree.h"
@@ -407,17 +407,9 @@ protected:
     static constexpr double kCell = 0.05;
     PaperInSubvolumes()
         : folder_("vcp_subvolume_caster_test"), mesh_(test::torusMesh({0.3, 0.2, 0.1}, 2, 0.8, 90, 40)) {
-        const fs::path ply = folder_ / "mesh.ply", file = folder_ / "mesh.vcp";
-        test::writePly(mesh_, ply);
-        mesh_ = *loadMesh(ply);
+        const fs::path file = test::buildSubvolumes(folder_, mesh_, kCell);
+        mesh_ = *loadMesh(folder_ / "mesh.ply");
         bvh_.emplace(mesh_);
-        BuildOptions build;
-        build.inputs = {ply};
-        build.output = file;
-        build.cell = kCell;
-        PaperOptions paper;
-        paper.subvolumeCells = 16;
-        EXPECT_TRUE(buildPaperFile(build, paper));
         auto opened = SubvolumeCaster::open(file, {});
         EXPECT_TRUE(opened) << opened.error().line();
         cut_.emplace(std::move(*opened));
